@@ -344,8 +344,13 @@ def calibration_text(folder: Path, made: Made, rng: np.random.Generator, *, play
             text += (
                 f"base_um = {numbers(rng.normal(0, 40, 3))}\nplatform_um = {numbers(rng.normal(0, 30, 3))}\n"
             )
+    hung = hanging(made, rng)
+    text += "".join(hung.values())
     if not made.platforms:
         for name, axis in made.axes.items():
+            if name in hung:
+                # its springs and what it carries would count twice
+                continue
             own = "own_urad_Nm" if axis.kind == "rotary" else "own_um_kN"
             text += f"[elasticity.{name}]\n{own} = {rng.uniform(0.1, 0.8):.3f}\n"
             text += f"{rng.choice(list('ABC'))}_urad_Nm = {rng.uniform(0.02, 0.2):.3f}\n"
@@ -362,6 +367,22 @@ def calibration_text(folder: Path, made: Made, rng: np.random.Generator, *, play
         for name, axis in made.axes.items():
             text += f"{name}_{'urad' if axis.kind == 'rotary' else 'um'} = {rng.uniform(1, 20):.3f}\n"
     return text
+
+
+def hanging(made: Made, rng: np.random.Generator) -> dict[str, str]:
+    """By joint what the weight on it does, as sums of angles, which state it without masses: of arms, whose
+    first axis is upright."""
+    lines = {name: axis.direction for name, axis in made.axes.items()}
+    if "J6" not in lines or "J7" in lines or rng.random() < 0.4:
+        return {}
+    found = {}
+    for name, groups in (("J2", [["J2"], ["J2", "J3"]]), ("J3", [["J2", "J3"]])):
+        found[name] = "".join(
+            f'[[gravity]]\ncomponent = "E{name}{name}"\nangles = {group!r}\n'
+            f"sin_urad = {rng.normal(0, 150):.3f}\ncos_urad = {rng.normal(0, 150):.3f}\n"
+            for group in groups
+        ).replace("'", '"')
+    return found
 
 
 def write_machine(

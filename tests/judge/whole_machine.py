@@ -151,6 +151,10 @@ class WholeMachine:
         if sides is not None:
             side = dict(zip(self.order, sides.T, strict=True))
         gives = self._gives(at) if actual and self.errors.get("elasticity") else {}
+        for term in self.errors.get("gravity", []) if actual else []:
+            # E and twice the name of the axis
+            name = term["component"][1 : 1 + len(term["component"]) // 2]
+            gives[name] = gives.get(name, np.zeros((len(values), 7))) + self._hangs(name, term, at)
         pose = whole()
         for name in self.chain:
             if name in self.file.get("platforms", {}):
@@ -249,6 +253,16 @@ class WholeMachine:
                 parts = np.broadcast_arrays(*shift.T, *tilt.T, own, np.zeros(rows))[:7]
                 gone[name] = np.stack(parts, axis=1)
         return gone
+
+    def _hangs(self, name: str, term: Mapping[str, Any], at: Mapping[str, np.ndarray]) -> np.ndarray:
+        """(n, 7) as `_gives`: the own turn of a joint by what hangs on it at a sum of angles, each counted
+        about the direction of the joint."""
+        lies = sum(
+            np.radians(at[one]) * np.sign(self.direction(one) @ self.direction(name))
+            for one in term["angles"]
+        )
+        turn = term.get("sin_urad", 0.0) * np.sin(lies) + term.get("cos_urad", 0.0) * np.cos(lies)
+        return np.outer(1e-6 * np.asarray(turn), np.eye(7)[6])
 
     def _weights(self, names: list[str], bodies: Mapping[str, np.ndarray], tool: bool) -> list[Any]:
         found = []
