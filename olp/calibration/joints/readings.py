@@ -13,6 +13,7 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
+from olp.calibration.joints.candidates import Priors
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
@@ -23,6 +24,8 @@ from olp.kinematics.motion import nominal_motion
 from olp.kinematics.poses import Poses, rotation_vector
 from olp.kinematics.structure import FRAME, Structure
 
+#: Standard deviation of the rotation of the whole machine, in those of the tilt of an axis.
+_LEANS = 2.0
 #: An unknown without a prior.
 FREE = np.inf
 
@@ -202,7 +205,12 @@ class Ball(Reading):
         if self.in_machine:
             turn = _workpiece_in_machine(structure, self.values)
         sizes = [FREE] * (3 * len(self.names))
-        return _AtBall(self, self.own(sizes), self.measured_mm, np.full(3, self.sigma), centres, turn)
+        if not np.any(self.measured_mm):
+            return _AtBall(self, self.own(sizes), self.measured_mm, np.full(3, self.sigma), centres, turn)
+        # the rotation of its base, which a structure does not show beside a frame, turns what a ball reads
+        leans = [_LEANS * Priors.of(structure).tilt_rad] * 3
+        own = self.own([*leans, *sizes])
+        return _AtBallLeaning(self, own, self.measured_mm, np.full(3, self.sigma), centres, turn)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -217,6 +225,19 @@ class _AtBall(Start):
         centres = self.centres + own[: self.centres.size].reshape(-1, 3)
         away = self.reading.tips(pose, own) - centres[self.reading.which]
         return np.asarray((self.turn @ away[..., None])[..., 0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _AtBallLeaning(_AtBall):
+    """The same, with axes of the readings that lean by a rotation vector, the first three of the unknowns."""
+
+    turns: ClassVar[tuple[int, ...]] = (0, 1, 2)
+
+    def predicted(self, pose: Poses, own: Array) -> Array:
+        away = _AtBall.predicted(self, pose, own[3:])
+        lean = np.swapaxes(self.turn, -1, -2)
+        upright = (lean @ away[..., None])[..., 0] @ rotation_of(own[:3]).T
+        return np.asarray((self.turn @ upright[..., None])[..., 0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

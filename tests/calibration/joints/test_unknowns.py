@@ -13,6 +13,7 @@ from olp.calibration.joints.candidates import Priors
 from olp.calibration.joints.readings import FREE, Ball, Planes, Reading
 from olp.calibration.joints.unknowns import Model, model_of
 from olp.core.arrays import Array
+from olp.core.rigid_fit import rotation_of
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.poses import Poses
 
@@ -93,6 +94,18 @@ def test_ranks_on_balls(name: str, balls: int, rank: int) -> None:
     assert fit_joints(model, [reading]).determined == rank
     # a probe of unknown length hides three more
     assert fit_joints(model, [replace(reading, tool_sigma=FREE)]).determined == rank - 3
+
+
+@pytest.mark.slow
+def test_a_machine_that_stands_askew_turns_what_a_ball_reads() -> None:
+    """No structure shows the turn of its base beside a frame, so no unknown of the machine stands for it. A
+    deviation of 10 mm is read 10 um aside where the base leans by 1 mrad."""
+    model, _, reading = at_places("xyzac_trunnion", BALLS, 20.0)
+    assert isinstance(reading, Ball) and 5.0 < np.abs(reading.measured_mm).max() < 60.0
+    askew = reading.measured_mm @ rotation_of(np.array((8e-4, -5e-4, 6e-4))).T
+    fit = fit_joints(model, [replace(reading, measured_mm=askew, sigma=1.5e-3)])
+    assert fit.chi_square / fit.freedom < 0.05
+    assert not fit.left_out
 
 
 @pytest.mark.parametrize("name", ["xyzac_trunnion", "gantry_wrist"])
