@@ -39,7 +39,9 @@ def sentence_of(report: Report) -> str:
     unseen = _by_name(report)
     expected = number(report["uncertainty_in_best_frame"]["tip_with_misfit_um"])
     if not unseen:
-        return f"Too few readings to hold some out. A tip is expected to be off by {expected} um (rms)"
+        why = report.get("held_out_unknown")
+        none = f"No readings are held out: {why}" if why else "Too few readings to hold some out"
+        return f"{none}. A tip is expected to be off by {expected} um (rms)"
     before, after = unseen["before"], unseen["after"]
     return (
         f"At {after['rows']} readings that had no part in the fit the tip was off by "

@@ -13,6 +13,7 @@ from olp.calibration.joints.findings import fit_or_refuse, joint_findings
 from olp.calibration.joints.payloads import refuse_other_payloads
 from olp.calibration.joints.unknowns import model_of
 from olp.core.arrays import Array
+from olp.core.errors import CannotCompute
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
 from olp.core.values import dataclass
 from olp.files.kinematics.covariance import JointCovariance, lines_of
@@ -83,9 +84,15 @@ def fit_joint_calibration(
     refuse_other_payloads(model, campaign.readings, str(data))
     fit = fit_or_refuse(model, campaign.readings)
     findings = joint_findings(fit, campaign.readings)
-    unseen = held_out(fit)
+    try:
+        unseen, settles = held_out(fit), True
+    except CannotCompute:
+        # what the whole fit says of its readings counts more
+        unseen, settles = None, False
     files = (str(machine), *campaign.files)
-    return FittedJoints(fit, campaign, _report(fit, unseen), unseen, findings, valid_until, files)
+    return FittedJoints(
+        fit, campaign, _report(fit, unseen, settles=settles), unseen, findings, valid_until, files
+    )
 
 
 def _box(fit: JointFit) -> dict[str, tuple[float, float]]:
@@ -97,7 +104,8 @@ def _box(fit: JointFit) -> dict[str, tuple[float, float]]:
     }
 
 
-def _report(fit: JointFit, unseen: tuple[Array, Array] | None) -> dict[str, Any]:
+def _report(fit: JointFit, unseen: tuple[Array, Array] | None, *, settles: bool) -> dict[str, Any]:
+    """The report; `settles` says whether the readings that are not held out settle."""
     model = fit.model
     report: dict[str, Any] = {
         "schema": "olp-joint-fit-1",
@@ -123,6 +131,8 @@ def _report(fit: JointFit, unseen: tuple[Array, Array] | None) -> dict[str, Any]
             {"name": words, "rows": len(off), **_figures(off)}
             for words, off in (("before", before), ("after", after))
         ]
+    if not settles:
+        report["held_out_unknown"] = "without the fifth that is held out the readings do not settle"
     report["unknowns"] = [
         {
             "name": unknown.name,
