@@ -61,12 +61,14 @@ RETIME = (
 VIEW = ("live", "port", "no_time", "measured", "part_tolerance_um")
 
 
+_LOG = (
+    "a log of axis values is a list of positions there; olp simulate LOG.csv makes tips of it, with the "
+    "machine's errors, and olp compare takes these"
+)
 #: Why an option is not for such machines, and how to go on, by its word.
 WHY_NOT = {
     "accept": "no doubts about the inputs are found there, so none is accepted; leave it out",
-    "add_errors": (
-        "the errors count along the chain; correct the program, and compare the run with the corrected one"
-    ),
+    "add_errors": _LOG,
     "at": "their position is more than X, Y and Z; show a place of the machine file with --axes, such as "
           "--axes C=30",
     "axes": "a program has many positions; name the machine file alone, as in "
@@ -95,9 +97,7 @@ WHY_NOT = {
     ),
     "plot": "the curves are those of the machine; name the machine file alone, as in "
             "olp inspect machine.toml --plot curves.svg",
-    "positions": (
-        "a log of axis values is a program there: olp simulate LOG makes poses of it, which olp compare takes"
-    ),
+    "positions": _LOG,
     "program": "readings are a plan, not a run of a program; leave it out",
     "profile": "a list names its columns in its first line, as axes with units, such as X_mm,C_deg",
     "proof": "the budget of accelerations is that of three linear axes; leave it out",
@@ -132,6 +132,12 @@ def on_joints(machine: str | None, job: str | None, also: Collection[str] = ()) 
             f"{option.opts[0]} is not for machines with rotary joints: {WHY_NOT.get(wrong[0], _OTHER)}"
         )
     return True
+
+
+def refuse_joints(machine: str | None, job: str | None, why: str) -> None:
+    """Raises UsageError, which says `why`, where the machine of a call has rotary joints."""
+    if not click.get_current_context().meta.get(KNOWN) and _is_of_joints(machine, job):
+        raise UsageError(f"the machine has rotary joints: {why}")
 
 
 def _is_of_joints(machine: str | None, job: str | None) -> bool:

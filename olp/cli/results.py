@@ -90,6 +90,13 @@ def command(results: str, machine: str | None, job: str | None, **words: Any) ->
     RESULTS is a table of points or DMIS output. The machine's error is added to the reported points, so that
     the corrected results are where the tip really was.
     """
+    from olp.cli import joints
+
+    joints.refuse_joints(
+        machine, job,
+        "a reported point does not state the values of all axes, on which its error depends; correct the "
+        "program that measures with olp correct",
+    )  # fmt: skip
     asked = options_of(_Asked, words)
     call = given(results, machine, job)
     output = asked.output or default_output(call.program)

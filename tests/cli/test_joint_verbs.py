@@ -224,5 +224,27 @@ def test_a_refused_option_says_why_and_how_to_go_on() -> None:
         for option in command.params:
             known = option.name in (*joints.ALWAYS, *also, *joints.WHY_NOT)
             assert known or not option.expose_value, f"{verb} {option.name}"
+    results = run("results", ARM / "deburr.csv", "-m", ARM / "machine.toml")
+    assert results.exit_code == 2 and "does not state the values of all axes" in results.stderr
     said = run("retime", "-j", ARM / "job.toml", "--max-inertial-um", "3")
     assert "compliance to accelerations is stated for three linear axes" in said.stderr
+
+
+@pytest.mark.slow
+def test_a_log_of_axis_values_is_compared_by_its_tips(tmp_path: Path) -> None:
+    """The way on that the refusal of --positions names: a log of the nominal positions shows the errors."""
+    machine = FOLDER / "trunnion-mill" / "machine.toml"
+    (tmp_path / "part.nc").write_text(PART)
+    refused = run("compare", tmp_path / "part.nc", tmp_path / "log.csv", "-m", machine, "--positions", "axes")
+    assert "olp simulate LOG.csv" in refused.stderr
+    (tmp_path / "log.csv").write_text(
+        "X_mm,Y_mm,Z_mm,A_deg,C_deg\n0,0,-90,0,0\n9,0,-120,0,0\n5,5,-120,-10,40\n0,0,-120,0,0\n"
+    )
+    for source in ("part.nc", "log.csv"):
+        done = run("simulate", tmp_path / source, "-m", machine, "-o", tmp_path / f"{source}.tips.csv", "-q")
+        assert done.exit_code == 0, done.output
+    most = [
+        json.loads(run("compare", tmp_path / "part.nc", tips, "-m", machine, "--json").stdout)["after"]
+        for tips in (tmp_path / "part.nc.tips.csv", tmp_path / "log.csv.tips.csv")
+    ]
+    assert most[0]["across_um"]["max"] == pytest.approx(most[1]["across_um"]["max"], rel=0.05)
