@@ -6,6 +6,7 @@ partners in their order.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from difflib import SequenceMatcher
 
@@ -17,6 +18,8 @@ from olp.core.units import RAD_PER_URAD, UM_PER_MM
 from olp.program.text.line_ends import LINE_END_TEXT
 from olp.workflows.joints.correct import ProvedJoints
 
+#: A number that is no part of a name.
+_NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)")
 #: A change of a coordinate below this is none, um or urad.
 _NONE = 0.05
 
@@ -75,11 +78,15 @@ def _pairs(nominal: list[str], corrected: list[str], partners: dict[int, int]) -
 def _between(
     nominal: list[str], corrected: list[str], here: tuple[int, int], there: tuple[int, int]
 ) -> Iterator[Pair]:
-    """The lines from a move to the next: partners where there are as many, else where they are alike."""
+    """The lines from a move to the next: partners where there are as many, else where they are alike but for
+    their numbers."""
     if here[1] - here[0] == there[1] - there[0]:
         yield from zip(range(*here), range(*there), strict=True)
         return
-    texts = nominal[slice(*here)], corrected[slice(*there)]
+    texts = [
+        [_NUMBER.sub("", line) for line in lines]
+        for lines in (nominal[slice(*here)], corrected[slice(*there)])
+    ]
     for _, a, b, c, d in SequenceMatcher(None, *texts, autojunk=False).get_opcodes():
         rows, others = range(here[0] + a, here[0] + b), range(there[0] + c, there[0] + d)
         if len(rows) == len(others):

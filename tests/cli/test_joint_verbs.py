@@ -14,6 +14,7 @@ from click.testing import CliRunner, Result
 
 from olp.cli import joints, main
 from olp.cli.compare import _ON_JOINTS
+from olp.cli.joint_diff import _between
 from olp.workflows.joints.check import CODES
 
 FOLDER = Path(__file__).resolve().parents[2] / "programs"
@@ -248,3 +249,11 @@ def test_a_log_of_axis_values_is_compared_by_its_tips(tmp_path: Path) -> None:
         for tips in (tmp_path / "part.nc.tips.csv", tmp_path / "log.csv.tips.csv")
     ]
     assert most[0]["across_um"]["max"] == pytest.approx(most[1]["across_um"]["max"], rel=0.05)
+
+
+def test_data_of_robots_are_partners_by_their_names() -> None:
+    """Targets that stand before all moves, with one more that a correction inserts."""
+    nominal = ["p0:=[1.5,-2];", "p1:=[3,4];", "p2:=[5,6];"]
+    corrected = ["p0:=[1.49,-2.01];", "p1:=[3.01,4];", "p1_olp1:=[3,4];", "p2:=[5,6.02];"]
+    pairs = list(_between(nominal, corrected, (0, 3), (0, 4)))
+    assert pairs == [(0, 0), (1, 1), (None, 2), (2, 3)]
