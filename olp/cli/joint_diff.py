@@ -83,11 +83,11 @@ def _between(
     if here[1] - here[0] == there[1] - there[0]:
         yield from zip(range(*here), range(*there), strict=True)
         return
-    texts = [
+    before, after = (
         [_NUMBER.sub("", line) for line in lines]
         for lines in (nominal[slice(*here)], corrected[slice(*there)])
-    ]
-    for _, a, b, c, d in SequenceMatcher(None, *texts, autojunk=False).get_opcodes():
+    )
+    for _, a, b, c, d in SequenceMatcher(None, before, after, autojunk=False).get_opcodes():
         rows, others = range(here[0] + a, here[0] + b), range(there[0] + c, there[0] + d)
         if len(rows) == len(others):
             yield from zip(rows, others, strict=True)
