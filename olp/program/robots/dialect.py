@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 from typing import Protocol
 
@@ -28,6 +28,22 @@ class Postures(Protocol):
     def turns(
         self, config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float], /
     ) -> list[int | None]: ...
+
+
+def next_number(taken: set[str], stated: Callable[[], Iterable[int]], least: int) -> int:
+    """The number behind all that a text has stated, `least` or more, and behind those that were given before.
+    `taken` keeps these as `#N`, so that each is found in a few steps."""
+    if "#" not in taken:
+        # all numbers up to the last one count as taken
+        taken |= {f"#{number}" for number in range(max(stated(), default=least - 1) + 1)} | {"#"}
+    low, high = least - 1, max(least, 1)
+    while f"#{high}" in taken:
+        high *= 2
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if f"#{middle}" in taken else (low, middle)
+    taken.add(f"#{high}")
+    return high
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

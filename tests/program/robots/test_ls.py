@@ -14,6 +14,7 @@ from judge.model import JudgeModel
 
 import olp
 from olp.core.errors import OlpError, ProgramError
+from olp.program.robots.dialect import next_number
 
 FRAMES = {1: (300.0, 250.0, -300.0, 25.0), 2: (350.0, 200.0, -250.0, 0.0)}
 RECIPE = Recipe(
@@ -211,3 +212,23 @@ def test_what_the_program_says_of_frames_and_tools_is_held_against_the_job(tmp_p
     assert "P[1] is in UFRAME 1, and UFRAME_NUM is 2 here: the control stops" in told
     assert any("the tool weaves from here on" in one for one in told)
     assert not any("UTOOL" in one for one in told)
+
+
+def test_the_numbers_of_clones_follow_those_of_the_text() -> None:
+    """Each is found in a few steps, however many there are."""
+    taken: set[str] = set()
+    assert [next_number(taken, lambda: [3, 7, 1], 1) for _ in range(4)] == [8, 9, 10, 11]
+    assert [next_number(set(), list, least) for least in (0, 1)] == [0, 1]
+    reads = Counted(taken)
+    assert next_number(reads, list, 1) == 12
+    assert reads.count < 12
+
+
+class Counted(set[str]):
+    """A set that counts how often it is asked."""
+
+    count = 0
+
+    def __contains__(self, name: object) -> bool:
+        self.count += 1
+        return super().__contains__(name)

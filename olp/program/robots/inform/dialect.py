@@ -10,7 +10,7 @@ from olp.core.patterns import pattern
 from olp.core.spool import whole
 from olp.core.values import dataclass
 from olp.program.program import Program
-from olp.program.robots.dialect import Replacement, RobotDialect
+from olp.program.robots.dialect import Replacement, RobotDialect, next_number
 from olp.program.robots.inform import postures
 from olp.program.robots.inform.reader import read
 from olp.program.robots.inform.table import TABLE
@@ -49,12 +49,10 @@ class Inform(RobotDialect):
         return place, place, b"'" + words.rstrip() + program.eol(1)
 
     def named(self, program: Program, target: Target, taken: set[str]) -> str:
-        if "#0" not in taken:
-            # all numbers up to the last one count as taken
-            numbers = [int(match[1]) for name in taken if (match := _NUMBERED.fullmatch(name))]
-            taken |= {f"#{number}" for number in range(max(numbers, default=-1) + 1)} | {"#"}
-        number = _first_free(taken)
-        taken.add(f"#{number}")
+        def stated() -> list[int]:
+            return [int(match[1]) for name in taken if (match := _NUMBERED.fullmatch(name))]
+
+        number = next_number(taken, stated, 0)
         digits = len(target.name) - 1 if target.name[:1].upper() == "C" else _DIGITS
         return f"C{number:0{digits}d}"
 
@@ -190,17 +188,6 @@ def _posture_before(data: bytes, place: int) -> bytes:
         begin = max(data.rfind(b"\n", 0, place), data.rfind(b"\r", 0, place)) + 1
         match = _POSTURE.match(data, begin)
     return match[1]
-
-
-def _first_free(taken: set[str]) -> int:
-    """The number behind those that are taken, all of which follow one another from 0 on."""
-    low, high = -1, 1
-    while f"#{high}" in taken:
-        high *= 2
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if f"#{middle}" in taken else (low, middle)
-    return high
 
 
 DIALECT = Inform(

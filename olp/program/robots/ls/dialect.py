@@ -8,7 +8,7 @@ from olp.core.patterns import pattern
 from olp.core.spool import whole
 from olp.core.values import dataclass
 from olp.program.program import Program
-from olp.program.robots.dialect import Replacement, RobotDialect
+from olp.program.robots.dialect import Replacement, RobotDialect, next_number
 from olp.program.robots.ls import postures
 from olp.program.robots.ls.reader import read
 from olp.program.robots.ls.table import TABLE
@@ -41,11 +41,7 @@ class Ls(RobotDialect):
         return place, place, b"    :  !" + words.rstrip() + b" ;" + program.eol(1)
 
     def named(self, program: Program, target: Target, taken: set[str]) -> str:
-        if "" not in taken:
-            # the numbers of the text are found once
-            taken.add("")
-            taken |= {number.decode() for number in _NUMBERED.findall(program.data)}
-        return str(max((int(name) for name in taken if name.isdigit()), default=0) + 1)
+        return str(next_number(taken, lambda: map(int, _NUMBERED.findall(program.data)), 1))
 
     def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
         return [self._statement(program, move, use, [(use, part)]), self._declared(program, part, use)]
