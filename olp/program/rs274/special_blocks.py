@@ -168,10 +168,10 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
                 word=f"M{m / 10:g}",
             )
     for (c, _), number in zip(codes, numbers, strict=True):
-        letter, why = profile.lathe_words.get(c, ("", ""))
-        if letter and any(word.letter == letter for word in words):
+        letters, why = profile.lathe_words.get(c, ("", ""))
+        if letters and {word.letter for word in words}.issuperset(letters):
             raise ProgramError(
-                f"G{number:g} {letter} {why} of a lathe, whose X states diameters; "
+                f"G{number:g} {' '.join(letters)} {why} of a lathe, whose X states diameters; "
                 "give the program of a mill",
                 line=line,
                 code="OLP512",

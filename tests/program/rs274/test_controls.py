@@ -420,6 +420,14 @@ def test_where_cycles_return_may_be_stated_where_it_is_a_setting(
             assert end == outcome(text, given, profile)
 
 
+@pytest.mark.parametrize("control", [FANUC, HAAS])
+def test_a_lathe_is_known_by_its_slides(control: str, setups: dict[str, Setup]) -> None:
+    got = outcome("G0 X1. Y0. Z0.\nG28 U0 W0", setups[control], DIALECTS[control])
+    assert is_it(got, "G28 U W sends both slides home of a lathe, whose X states diameters")
+    # a boring mill sends its quill home
+    assert is_it(outcome("G0 X1. Y0. Z0.\nG28 W0", setups[control], DIALECTS[control]), (1, 0, 0))
+
+
 @pytest.mark.parametrize("line", ["$G ; state", "$$", "?", "~", "$X (unlock)"])
 def test_what_grbl_answers_moves_nothing(line: str, setups: dict[str, Setup]) -> None:
     text = f"G0 X1. Y2. Z3.\n{line}\nG91\nX1."

@@ -100,7 +100,7 @@ class Profile(Dialect):
       level and R, and the G codes that do the same elsewhere.
     - `still_with`: codes that are refused but for a block of their own with this letter and one of its
       numbers, where they change nothing of the path.
-    - `lathe_words`: letters beside codes that show a program of a lathe, and what they do there.
+    - `lathe_words`: letters that together beside codes show a program of a lathe, and what they do there.
     - `cycles_apart`: canned cycles and G80 are a separate modal group.
     - `axis_dwell`: G4 takes its time from X and U, too, and counts milliseconds where it has no point.
     - `exact_stop`: G61 stops at the end of each block, as G9 does in one, and G62 and G63 end it as G64 does.

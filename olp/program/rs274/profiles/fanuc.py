@@ -36,6 +36,6 @@ DIALECT = replace(
     # G5 switches the high-speed mode; other numbers call cycles
     still_with={50: ("P", frozenset({0.0, 10000.0}))},
     # a mill limits its spindle by G92 S
-    lathe_words={500: ("S", "limits the spindle")},
+    lathe_words={280: ("UW", "sends both slides home"), 500: ("S", "limits the spindle")},
     path_mode="cutting mode G64 of the control, unless a smoothing mode is on",
 )

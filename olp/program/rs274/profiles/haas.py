@@ -39,7 +39,7 @@ DIALECT = replace(
         },
     },
     # a mill states the limit of its spindle as G92 S or a setting
-    lathe_words={500: ("S", "limits the spindle")},
+    lathe_words={280: ("UW", "sends both slides home"), 500: ("S", "limits the spindle")},
     harmless_m=ISO.harmless_m | {10, 11, 29, 31, 33, 34, 35, 41, 42, 59, 69, 83, 84, 88, 89},
     g10_tools=frozenset({10, 11, 12, 13}),
     further_offsets=("G154", "G54.1"),
