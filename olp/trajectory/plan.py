@@ -8,7 +8,7 @@ waypoint are always possible.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
 
@@ -19,12 +19,13 @@ from olp.core.errors import CannotCompute
 from olp.core.progress import Progress
 from olp.core.values import dataclass
 from olp.trajectory.audit import Audit, Ratios, with_jumps
-from olp.trajectory.contest import contest, fastest, improved, stops_of
+from olp.trajectory.contest import Solution, contest, fastest, improved, stops_of
 from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits, Route
+from olp.trajectory.searches import searched
 from olp.trajectory.smooth import needs_stop
 from olp.trajectory.solvers import Run
-from olp.trajectory.stretches import Stretch, least_to_optimise, runs_of, together
+from olp.trajectory.stretches import Stretch, runs_of, together
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +72,8 @@ def plan(
 ) -> Trajectory:  # fmt: skip
     """The motion of a route that begins and ends at rest.
 
-    `optimise`: whether speeds along dense curves are optimised; None: unless that would take minutes.
+    `optimise`: whether speeds along dense curves are optimised; None: where that is worth its work, as
+    `olp.trajectory.searches` finds.
     `tubes`: whether path and speed may be planned together where that gains most.
     Raises CannotCompute for a route that is not finite.
     """
@@ -83,9 +85,16 @@ def plan(
 
     def parts() -> Iterator[Motion]:
         runs = runs_of(route, limits, tubes=tubes and optimise is not False)
-        least = least_to_optimise(runs) if optimise is None else (0 if optimise else len(route))
-        for stretch in together(runs, least):
-            for motion, some, ratio in _legs(route, limits, stretch, least):
+        known: dict[int, Solution] = {}
+        if optimise is None:
+            runs, known = searched(
+                runs, len(route), lambda run: _solution(route, limits, run),
+                lambda run: _in_group(route, limits, run),
+            )  # fmt: skip
+        elif optimise:
+            runs = [replace(run, optimise=True) for run in runs]
+        for stretch in together(runs):
+            for motion, some, ratio in _legs(route, limits, stretch, known):
                 legs.extend(some)
                 used[0] = used[0].with_those(ratio)
                 yield motion
@@ -127,26 +136,17 @@ def _with_stops(route: Route) -> Route:
 
 
 def _legs(
-    route: Route, limits: AxisLimits, stretch: Stretch, least: int
+    route: Route, limits: AxisLimits, stretch: Stretch, known: Mapping[int, Solution]
 ) -> Iterator[tuple[Motion, list[Leg], Ratios]]:
-    """The motion of a stretch, its legs and its ratios; run by run where all solvers fail on the whole."""
+    """The motion of a stretch, its legs and its ratios; run by run where all solvers fail on the whole. The
+    solutions of some runs are `known` by their first waypoint."""
     first, last = stretch.first, stretch.last
-    inner = slice(first, last + 1)
-    # pieces carry their segment while feeds are audited, their line afterwards
-    run = Run(
-        Route(
-            route.point_mm[inner], route.feed_mm_s[first:last], np.arange(last - first),
-            route.tolerance_mm[inner], np.zeros(last - first + 1),
-        ),
-        limits,
-    )  # fmt: skip
     if stretch.runs == 1 or len(stretch.candidates) == 1:
-        solution = fastest(run, stretch.candidates, stretch.segments >= least and stretch.runs == 1)
-        if solution is not None and stretch.tube:
-            solution = improved(run, solution)
+        alone = stretch.runs == 1 and first in known
+        solution = known[first] if alone else _solution(route, limits, stretch)
         chosen = [] if solution is None else [(0, last - first, solution)]
     else:
-        chosen = contest(run, stretch.candidates)
+        chosen = contest(_run(route, limits, stretch), stretch.candidates)
     if chosen:
         motion = Motion.joined(solution.driven() for _, _, solution in chosen)
         legs = [
@@ -165,11 +165,37 @@ def _legs(
             used = used.with_those(solution.ratios)
         yield _with_dwells(route, first, last, motion), _waiting(route, legs), used
         return
-    stops = first + stops_of(run.route)
+    stops = first + stops_of(_run(route, limits, stretch).route)
     if len(stops) <= 2:
         raise CannotCompute("no solver found a motion along this line", line=int(route.line[first]))
     for begin, end in pairwise(stops.tolist()):
-        yield from _legs(route, limits, Stretch(begin, end, stretch.candidates), least)
+        yield from _legs(route, limits, Stretch(begin, end, stretch.candidates), known)
+
+
+def _run(route: Route, limits: AxisLimits, stretch: Stretch) -> Run:
+    """What a stretch drives, without dwells. Pieces carry their segment while feeds are audited, their line
+    afterwards."""
+    first, last = stretch.first, stretch.last
+    inner = slice(first, last + 1)
+    own = Route(
+        route.point_mm[inner], route.feed_mm_s[first:last], np.arange(last - first),
+        route.tolerance_mm[inner], np.zeros(last - first + 1),
+    )  # fmt: skip
+    return Run(own, limits)
+
+
+def _solution(route: Route, limits: AxisLimits, stretch: Stretch) -> Solution | None:
+    """The fastest motion of a stretch along which one solver drives, None where all fail."""
+    run = _run(route, limits, stretch)
+    solution = fastest(run, stretch.candidates, stretch.optimise and stretch.runs == 1)
+    return improved(run, solution) if solution is not None and stretch.tube else solution
+
+
+def _in_group(route: Route, limits: AxisLimits, stretch: Stretch) -> Solution | None:
+    """The solution of a run as it is among others that are planned together, None where all fail."""
+    run = _run(route, limits, stretch)
+    winners = contest(run, stretch.candidates) if len(stretch.candidates) > 1 else []
+    return winners[0][2] if winners else fastest(run, stretch.candidates, False)
 
 
 def _with_dwells(route: Route, first: int, last: int, motion: Motion) -> Motion:

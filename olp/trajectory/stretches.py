@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index
 from olp.core.values import dataclass
 from olp.trajectory.contest import stops_of
 from olp.trajectory.forecast import straight
@@ -21,10 +21,8 @@ _FEW_SEGMENTS = 1
 _CLEAR_WIN = 0.8
 #: pieces per waypoint
 _PIECES = 3
-#: pieces that are optimised at most unless asked for: about a minute and a half
-_AFFORDED = 1_000_000
 #: segments of a short run, at most
-_SHORT = 64
+SHORT = 64
 #: pieces that take as long as the fixed cost of optimising one run
 _CALL = 500
 #: waypoints that are forecast together
@@ -39,14 +37,21 @@ _OF_TUBE = 30
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stretch:
-    """`runs` that are planned together, from waypoint `first` to `last` (both at rest), and the solvers that
-    may win there, the most promising first. In a `tube` path and speed are planned together after them."""
+    """`runs` that are planned together, from waypoint `first` to `last` (both at rest), in about `least_s`,
+    and the solvers that may win there, the most promising first. In a tube of `cells` (0: none) path and
+    speed are planned together after them. Whether to `optimise` speeds is decided later."""
 
     first: int
     last: int
     candidates: tuple[Candidate, ...]
     runs: int = 1
-    tube: bool = False
+    cells: float = 0.0
+    least_s: float = 0.0
+    optimise: bool = False
+
+    @property
+    def tube(self) -> bool:
+        return self.cells > 0.0
 
     @property
     def segments(self) -> int:
@@ -55,6 +60,11 @@ class Stretch:
     @property
     def bends(self) -> bool:
         return any(candidate.solver.bends for candidate in self.candidates)
+
+    @property
+    def alone(self) -> bool:
+        """Whether it is planned by itself, for the sake of its bends."""
+        return self.bends and (self.optimise or self.segments > SHORT)
 
     def cost(self) -> float:
         """About the number of pieces to optimise."""
@@ -78,37 +88,29 @@ def runs_of(route: Route, limits: AxisLimits, *, tubes: bool = False) -> list[St
     keep = least_s <= np.where(bends, np.inf, first / _CLEAR_WIN)
     # a program of exact stops has as many runs as waypoints
     alone = [(Candidate(solver, 0.0),) for solver in SOLVERS]
-    tubed = _tubed(route, limits, stops, first) if tubes else np.zeros(len(first), bool)
+    cells = _tubed(route, limits, stops, first) if tubes else np.zeros(len(first))
     runs = []
-    for begin, end, ranks, fits, some, tube in zip(
+    for begin, end, ranks, fits, some, tube, about_s in zip(
         stops[:-1].tolist(), stops[1:].tolist(), order.T.tolist(), keep.T.tolist(), least_s.T.tolist(),
-        tubed.tolist(), strict=True,
+        cells.tolist(), first.tolist(), strict=True,
     ):  # fmt: skip
         if sum(fits) == 1:
             candidates = alone[ranks[0]]
         else:
             candidates = tuple(Candidate(SOLVERS[i], some[i]) for i in ranks if fits[i])
-        runs.append(Stretch(begin, end, candidates, tube=tube))
+        runs.append(Stretch(begin, end, candidates, 1, tube, about_s))
     return runs
 
 
-def least_to_optimise(runs: list[Stretch]) -> int:
-    """The fewest segments of a run for optimising, so that all such runs together cost at most _AFFORDED."""
-    long = sum(run.cost() for run in runs if run.segments > _SHORT)
-    short = sum(run.cost() for run in runs if run.segments <= _SHORT)
-    if long + short <= _AFFORDED:
-        return 0
-    return _SHORT + 1 if long <= _AFFORDED else max(run.last for run in runs) + 1
-
-
-def together(runs: list[Stretch], least: int) -> Iterator[Stretch]:
+def together(runs: list[Stretch]) -> Iterator[Stretch]:
     """The runs; straight ones, and short ones that are not optimised, are joined, as they may be many. Those
     in tubes are not."""
-    short = min(least, _SHORT + 1)
     begin = 0
     group: list[Stretch] = []
     for run in [*runs, None]:
-        small = run is not None and not run.tube and (run.segments < short or not run.bends)
+        small = (
+            run is not None and not run.tube and not (run.bends and (run.optimise or run.segments > SHORT))
+        )
         if group and (run is None or not small or run.last - begin > _TOGETHER):
             candidates = max((some.candidates for some in group), key=len)
             yield Stretch(begin, group[-1].last, candidates, len(group))
@@ -141,15 +143,16 @@ def _forecast(route: Route, limits: AxisLimits, stops: Index) -> Array:
     return seconds
 
 
-def _tubed(route: Route, limits: AxisLimits, stops: Index, least_s: Array) -> Mask:
-    """(r,) the runs that are planned in tubes: those that lose most time beside a straight move for each
-    cell, as many as are affordable. `least_s` (r,) are about the seconds of each run."""
+def _tubed(route: Route, limits: AxisLimits, stops: Index, least_s: Array) -> Array:
+    """(r,) cells of the runs that are planned in tubes: those that lose most time beside a straight move for
+    each cell, as many as are affordable; 0 of others. `least_s` (r,) are about the seconds of each run."""
     segment_s, straight_s = straight(route, limits, stops)
     cells = cells_of(segment_s, route.tolerance_mm, limits)
     count = np.maximum(np.add.reduceat(cells, stops[:-1]), 1.0)
     order = np.argsort((straight_s - least_s) / count, kind="stable")
     fits = (np.diff(stops) > 1) & (count <= MOST_CELLS)
     order = order[fits[order]]
-    tubed = np.zeros(len(least_s), bool)
-    tubed[order[np.cumsum(_OF_TUBE + count[order]) <= _CELLS]] = True
-    return tubed
+    tubed = order[np.cumsum(_OF_TUBE + count[order]) <= _CELLS]
+    found = np.zeros(len(least_s))
+    found[tubed] = count[tubed]
+    return found
