@@ -1,7 +1,8 @@
 """The least time of a spline of time inside bounds that its nodes share with few others.
 
 A primal-dual interior method. Every step of it stays strictly within all bounds. Lengths of cells make the
-bounds other than convex: a ridge on their change, which grows where steps have to be cut, holds them back.
+bounds other than convex: a ridge on their change holds them back. It grows at the cells whose bounds cut a
+step, and nowhere else.
 Source: Boyd and Vandenberghe, Convex Optimization, 11.7; Levenberg-Marquardt for the ridge.
 """
 
@@ -21,7 +22,7 @@ _FIRST = 0.05
 #: least barrier
 _LEAST = 3e-4
 #: (length, factor): the factor by which the barrier falls after a step longer than that
-_FALL = ((0.8, 0.5), (0.4, 0.7), (0.2, 0.9), (-1.0, 1.0))
+_FALL = ((0.8, 0.5), (0.4, 0.7), (0.2, 0.9), (-1.0, 0.97))
 #: share of the distance to the boundary that a step may take
 _NEAR = 0.95
 #: share of its slack that a step leaves to each row
@@ -52,10 +53,16 @@ _APART = 1e3
 _STEPS = 80
 #: steps of no length at most
 _STUCK = 4
-#: change of the time, relative, below which it counts as still ...
-_DONE = 1e-4
+#: change of the time, relative, below which the search ends ...
+_DONE = 2e-4
+#: ... over so many steps ...
+_OVER = 8
 #: ... where the barrier is below this
 _BARRIER = 2e-3
+#: a step is at most so many times as long as the one before ...
+_LONGER = 2.0
+#: ... and that counts as no shorter than this
+_SHORTEST = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,22 +105,24 @@ def least_time(spline: TimeSpline, bounds: Bounds, size_mm: float) -> TimeSpline
     count = sum(group.value.size * (1 + group.sides) for group in groups)
     mu = _FIRST / count
     duals = [mu / group.slack() for group in groups]
-    ridge, calm, stuck = _RIDGE, 0, 0
+    ridge, stuck = np.full(len(spline), _RIDGE), 0
+    longest, times = 1.0, [whole]
     for _ in range(_STEPS):
         try:
             step = _newton(spline, groups, duals, mu, whole, size_mm, ridge)
         except LinAlgError:
             break
         changes = [group.change(step) for group in groups]
-        there, length = _toward(spline, groups, changes, bounds, step)
-        if length < _SHORT or length > _LONG:
-            ridge = min(max(ridge * (_STIFFER if length < _SHORT else _SOFTER), _RIDGES[0]), _RIDGES[1])
+        there, length, most = _toward(spline, groups, changes, bounds, step, longest)
+        longest = _LONGER * max(length, _SHORTEST)
+        factor = np.where(most < _SHORT, _STIFFER, np.where(most > _LONG, _SOFTER, 1.0))
+        ridge = np.clip(ridge * factor, *_RIDGES)
         if not length:
             stuck += 1
             if stuck == _STUCK:
                 break
             continue
-        before, spline = spline.duration_s, there
+        spline = there
         dual_length = _advance(groups, duals, changes, mu)
         groups = bounds(spline, True)
         for dual, group in zip(duals, groups, strict=True):
@@ -121,16 +130,15 @@ def least_time(spline: TimeSpline, bounds: Bounds, size_mm: float) -> TimeSpline
             np.clip(dual, central / _APART, central * _APART, out=dual)
         mu *= next(fall for least, fall in _FALL if min(length, dual_length) > least)
         mu = max(mu, _LEAST / count)
-        still = before - spline.duration_s < _DONE * before and mu * count < _BARRIER and length > _SHORT
-        calm = calm + 1 if still else 0
-        if calm == 2:
+        times.append(spline.duration_s)
+        if mu * count < _BARRIER and times[-1] > (1.0 - _DONE) * times[max(len(times) - 1 - _OVER, 0)]:
             break
     return spline
 
 
 def _newton(
     spline: TimeSpline, groups: list[Group], duals: list[Array], mu: float, whole: float, size_mm: float,
-    ridge: float,
+    ridge: Array,
 ) -> Array:  # fmt: skip
     """Newton's step of the nodes, padded by one before and two behind (m + 6, axes + 1)."""
     m, axes = len(spline), spline.coefficient.shape[1]
@@ -149,9 +157,9 @@ def _newton(
             block += dual[0, :, :, None] * (curve.transpose(0, 2, 1) @ curve)
         pull = (mu * group.signs() / slack).sum(axis=0)
         pulled = (pull[:, None, :] @ rows).reshape(-1, NODES, wide)
-        np.add.at(blocks, group.base + 1, block)
+        _add(blocks, group.base + 1, block)
         for k in range(NODES):
-            np.add.at(gradient, group.base + 1 + k, pulled[:, k])
+            _add(gradient, group.base + 1 + k, pulled[:, k])
     scale = np.full((m + 6, wide), size_mm)
     scale[2 : m + 2, axes] = spline.cell_s
     free = np.zeros((m + 6, wide), bool)
@@ -180,25 +188,55 @@ def _solved(blocks: Array, gradient: Array, scale: Array, free: Array, stiff: Ar
     return np.asarray(-used * solveh_banded(band, used * gradient, overwrite_ab=True, check_finite=False))
 
 
+def _add(to: Array, place: Index, rows: Array) -> None:
+    """Add rows at places in order; `ufunc.at`, which bears equal ones, takes many times as long."""
+    if (np.diff(place) == 1).all():
+        to[place[0] : place[0] + len(place)] += rows
+    else:
+        np.add.at(to, place, rows)
+
+
 def _toward(
-    spline: TimeSpline, groups: list[Group], changes: list[Array], bounds: Bounds, step: Array
-) -> tuple[TimeSpline, float]:
-    """The spline after a part of a step that leaves each row some of its slack, and that part; 0: none."""
+    spline: TimeSpline,
+    groups: list[Group],
+    changes: list[Array],
+    bounds: Bounds,
+    step: Array,
+    longest: float,
+) -> tuple[TimeSpline, float, Array]:
+    """The spline after a part of a step that leaves each row some of its slack, and that part; 0: none. And
+    (m,) the part of the step that the bounds of each cell bear."""
     m, axes = len(spline), spline.coefficient.shape[1]
     slacks = [group.slack() for group in groups]
-    fall = max(
-        float((-change / slack).max(initial=0.0)) for change, slack in zip(changes, slacks, strict=True)
-    )
-    length = min(1.0, _NEAR / fall) if fall > 0.0 else 1.0
+    # of each node, as the step
+    most = np.ones(m + 6)
+    for group, change, slack in zip(groups, changes, slacks, strict=True):
+        fall = (-change / slack).max(axis=(0, 2), initial=0.0)
+        some = np.flatnonzero(fall > _NEAR)
+        _lower(most, group.base[some], _NEAR / fall[some])
+    length = min(float(most.min()), longest)
     for _ in range(_TRIES):
         part = length * step
         there = spline.moved(part[1 : m + 4, :axes], part[2 : m + 2, axes])
-        if (there.cell_s > 0.0).all():
-            left = [group.slack() for group in bounds(there, False)]
-            if all((some > _LEAVE * slack).all() for some, slack in zip(left, slacks, strict=True)):
-                return there, length
+        if (there.cell_s <= 0.0).any():
+            none = np.flatnonzero(there.cell_s <= 0.0)
+            _lower(most, none, np.full(len(none), _BACK * length))
+        else:
+            good = True
+            for group, slack in zip(bounds(there, False), slacks, strict=True):
+                short = np.flatnonzero((group.slack() <= _LEAVE * slack).any(axis=(0, 2)))
+                good &= not len(short)
+                _lower(most, group.base[short], np.full(len(short), _BACK * length))
+            if good:
+                return there, length, most[2 : m + 2]
         length *= _BACK
-    return spline, 0.0
+    return spline, 0.0, most[2 : m + 2]
+
+
+def _lower(most: Array, base: Index, part: Array) -> None:
+    """Lower what the nodes of rows bear to the `part` of each row."""
+    for k in range(NODES if len(base) else 0):
+        np.minimum.at(most, base + 1 + k, part)
 
 
 def _advance(groups: list[Group], duals: list[Array], changes: list[Array], mu: float) -> float:

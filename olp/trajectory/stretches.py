@@ -8,12 +8,12 @@ import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.values import dataclass
+from olp.trajectory.cells import MOST_CELLS, cells_of
 from olp.trajectory.contest import stops_of
 from olp.trajectory.forecast import straight
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.solvers import SOLVERS, Candidate
 from olp.trajectory.speedgrid import CELL_S
-from olp.trajectory.tube import MOST_CELLS, cells_of
 
 #: runs with no more segments than this are planned by the overlapping solver only
 _FEW_SEGMENTS = 1
@@ -29,7 +29,7 @@ _CALL = 500
 _BLOCK = 1 << 15
 #: waypoints of runs that are planned together, as a call costs more than a move
 _TOGETHER = 1 << 15
-#: cells of tubes at most, about 8 s
+#: cells of tubes at most, about 12 s
 _CELLS = 4000
 #: cells that take as long as the fixed cost of a tube
 _OF_TUBE = 30

@@ -9,31 +9,20 @@ knots and the jerks of cells, which is everywhere. `olp.trajectory.descent` find
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
 from olp.core.values import dataclass
+from olp.trajectory.cells import halved, knots
 from olp.trajectory.descent import Group, least_time
 from olp.trajectory.forecast import straight
 from olp.trajectory.motion import Motion
-from olp.trajectory.passing import passing_s
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.timespline import NODES, TimeSpline
 
-#: cells of a segment, and of the whole, at least where they are no shorter than ...
-_OF_SEGMENT = 16
-_OF_WHOLE = 48
-#: ... this share of the time in which the jerk moves an axis by the tolerance
-_FINEST = 1.4
-#: knots of the motion closer than this share of a cell are one
-_SAME = 0.25
-#: cells at most: a run that needs more is left as it is
-MOST_CELLS = 400
 #: share of the time of a straight move that a motion takes longer, where a faster one is sought
 _GAIN = 3e-3
 #: share of the tolerance within which the search begins
@@ -48,12 +37,12 @@ _OUTSIDE = 0.99
 _PULLS = 30
 #: factor by which the search begins slower than the limits allow
 _SLOWED = 1.1
+#: factor by which a spline may have to be slower than its motion before its cells are halved
+_ROUGH = 1.1
 #: a cell may become so much shorter ...
 _SHORTEST = 0.1
 #: ... and longer
 _LONGEST = 5.0
-#: s; a segment that is passed in less has no cell of its own
-_LEAST_S = 1e-7
 #: share of the speed by which the motion may turn back along its segment, as rounding
 _BACK = 1e-9
 _TINY = 1e-300
@@ -71,9 +60,8 @@ def in_tube(route: Route, limits: AxisLimits, motion: Motion) -> Motion:
     own = Route(route.point_mm[:, moves], route.feed_mm_s, route.line, route.tolerance_mm, route.dwell_s)
     some = AxisLimits(*(limit[moves] for limit in (limits.velocity, limits.acceleration, limits.jerk)))
     flat = Motion(motion.start_s, motion.time, motion.path[:, :, moves], motion.shape, motion.line)
-    knot_s, segment = _knots(own, some, flat)
-    tube = _Tube.of(own, some, segment)
-    spline = tube.inside(TimeSpline.through(flat, knot_s))
+    spline, tube, segment = _spline(own, some, flat)
+    spline = tube.inside(spline)
     spline = spline.slowed(_SLOWED * tube.excess(spline))
     tube = tube.from_here(spline)
     found = least_time(spline, tube.bounds, float(own.tolerance_mm[1:-1].min()))
@@ -86,44 +74,16 @@ def in_tube(route: Route, limits: AxisLimits, motion: Motion) -> Motion:
     return Motion(planned.start_s, planned.time, path, planned.shape, planned.line)
 
 
-def cells_of(lasts: Array, tolerance_mm: Array, limits: AxisLimits) -> Array:
-    """(n - 1,) about the cells of segments that last so long between waypoints of tolerances (n,)."""
-    return np.ceil(np.minimum(lasts / _finest_s(tolerance_mm, limits), _OF_SEGMENT))
-
-
-def _finest_s(tolerance_mm: Array, limits: AxisLimits) -> Array:
-    """(n - 1,) the shortest cells of segments between waypoints of tolerances (n,)."""
-    wide = np.maximum(tolerance_mm[:-1], tolerance_mm[1:])
-    return np.asarray(np.maximum(_FINEST * np.cbrt(wide / limits.jerk.max()), _LEAST_S))
-
-
-def _knots(route: Route, limits: AxisLimits, motion: Motion) -> tuple[Array, Index]:
-    """Knots (m + 1,) s, and the segment (m,) of each cell: where the motion passes waypoints, and where its
-    own cubics meet, and between so many that no cell is too long."""
-    passed = passing_s(route, motion)
-    lasts = np.diff(passed)
-    most = np.minimum(lasts / _OF_SEGMENT, passed[-1] / _OF_WHOLE)
-    most = np.maximum(most, _finest_s(route.tolerance_mm, limits))
-    if np.ceil(lasts / most).sum() > MOST_CELLS:
-        raise CannotCompute("the run is too long")
-    # only cubics of time meet at knots of a spline
-    own = motion.start_s if motion.time.shape[1] == 4 else passed
-    knots, segment = [0.0], []
-    for k in np.flatnonzero(lasts > _LEAST_S).tolist():
-        begin, end, gap = float(passed[k]), float(passed[k + 1]), _SAME * float(most[k])
-        edges = [begin]
-        for time in own[np.searchsorted(own, begin + gap) : np.searchsorted(own, end - gap)].tolist():
-            if time - edges[-1] > gap:
-                edges.append(time)
-        edges.append(end)
-        for a, b in pairwise(edges):
-            count = max(math.ceil((b - a) / most[k] - 1e-9), 1)
-            knots += [a + (b - a) * i / count for i in range(1, count)] + [b]
-            segment += [k] * count
-    if len(segment) > 2 * MOST_CELLS:
-        raise CannotCompute("the run is too long")
-    knots[0], knots[-1] = 0.0, float(passed[-1])
-    return np.array(knots), np.array(segment, np.int64)
+def _spline(route: Route, limits: AxisLimits, motion: Motion) -> tuple[TimeSpline, _Tube, Index]:
+    """The spline of a motion, its tube, and the segments of its cells. Cells are halved where the spline is
+    not near enough to the motion. Raises CannotCompute."""
+    knot_s, segment = knots(route, limits, motion)
+    while True:
+        tube, spline = _Tube.of(route, limits, segment), TimeSpline.through(motion, knot_s)
+        finer = halved(route, limits, knot_s, segment, tube.rough(spline))
+        if finer is None:
+            return spline, tube, segment
+        knot_s, segment = finer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -247,34 +207,61 @@ class _Tube:
             c[3:-3] -= (move / np.maximum(count, 1.0)[:, None])[3:-3]
         raise CannotCompute("the motion is not inside the tube")
 
+    def rough(self, spline: TimeSpline) -> Mask:
+        """(m,) the cells in which a spline through a motion leaves the tube, or exceeds limits by far."""
+        knot, *cells = self._excesses(spline)
+        rough: Mask = np.any([cell > _ROUGH for cell in cells], axis=0)
+        rough |= np.maximum(knot[:-1], knot[1:]) > _ROUGH
+        for place in spline.controls():
+            off = self._off(place.point())[0]
+            rough |= np.sqrt((off * off).sum(axis=1)) > self.wide
+        off = spline.at_knots(self.knot)[0] - self.centre
+        far = self.knot[np.sqrt((off * off).sum(axis=1)) > self.ball]
+        rough[far - 1] = rough[far] = True
+        return rough
+
     def excess(self, spline: TimeSpline) -> float:
         """The factor by which a spline has to be slower to keep all limits."""
-        rates = spline.rates()
-        speed = np.sqrt((rates.d1 * rates.d1).sum(axis=1))[2 : len(spline)]
-        return max(
-            float((np.abs(rates.d1) / self.limits.velocity).max()),
-            float((speed / self.feed).max(initial=0.0)),
-            float(np.sqrt((np.abs(rates.d2) / self.limits.acceleration).max())),
-            float(np.cbrt((np.abs(rates.d3) / self.limits.jerk).max())),
+        return max(float(some.max(initial=0.0)) for some in self._excesses(spline))
+
+    def _excesses(self, spline: TimeSpline) -> tuple[Array, Array, Array, Array]:
+        """The same of each knot (m + 1,) for its acceleration, and of each cell (m,) for its velocity, feed
+        and jerk."""
+        rates, limits = spline.rates(), self.limits
+        velocity = rates.d1[1:-1]
+        speed = np.sqrt((velocity * velocity).sum(axis=1))
+        return (
+            np.sqrt((np.abs(rates.d2) / limits.acceleration).max(axis=1)),
+            (np.abs(velocity) / limits.velocity).max(axis=1),
+            speed / np.concatenate((self.feed[:1], self.feed, self.feed[-1:])),
+            np.cbrt((np.abs(rates.d3) / limits.jerk).max(axis=1)),
         )
 
     def forward(self, spline: TimeSpline) -> bool:
-        """Whether the motion nowhere turns back: every cell moves along its segment or one beside it."""
+        """Whether the motion nowhere turns back: one after the other, its velocities lead along the segment
+        of their cell, or one beside it, and never along one before that again."""
         rates, h, m = spline.rates(), spline.lengths(), len(spline)
         knot = np.arange(m + 1)
         both = h[knot + 1] + h[knot + 2]
         share = (h[knot + 1] / both)[:, None]
         at_knot = rates.d1[knot] + share * (rates.d1[knot + 1] - rates.d1[knot])
-        controls = (at_knot[:-1], rates.d1[1:-1], at_knot[1:])
-        fastest = max(float(np.abs(rates.d1).max()), _TINY)
-        good = np.zeros(m, bool)
+        controls = np.stack((at_knot[:-1], rates.d1[1:-1], at_knot[1:]), axis=1)
+        back = _BACK * max(float(np.abs(rates.d1).max()), _TINY)
         change = np.flatnonzero((np.diff(self.begin, axis=0) != 0.0).any(axis=1))
         of = np.concatenate(([0], change + 1))
         own = np.searchsorted(of, np.arange(m), side="right") - 1
-        for step in (-1, 0, 1):
-            unit = self.unit[of[np.clip(own + step, 0, len(of) - 1)]]
-            good |= np.min([(e * unit).sum(axis=1) for e in controls], axis=0) >= -_BACK * fastest
-        return bool(good.all())
+        # along the segments before, of and behind each cell
+        beside = self.unit[of[np.clip(own[:, None] + np.arange(-1, 2), 0, len(of) - 1)]]
+        along = np.einsum("jkx,jsx->jks", controls, beside) >= -back
+        now = 0
+        for segment, some in zip(own.tolist(), along.tolist(), strict=True):
+            for ways in some:
+                now = max(now, segment - 1)
+                while now <= segment + 1 and not ways[now - segment + 1]:
+                    now += 1
+                if now > segment + 1:
+                    return False
+        return True
 
 
 def _round(base: Index, value: Array, most: Array, slope: Array) -> Group:

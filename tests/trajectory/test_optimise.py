@@ -197,9 +197,9 @@ def test_a_short_first_move_of_a_long_path_launches_within_bounds(step_mm: float
 def test_a_ramp_beside_a_turn_back_costs_no_stop() -> None:
     """The critical points stand still at such a turn, so their time says nothing of what optimising gains."""
     there = [[0, 0, 0], [0, -0.025, -0.3], [0, -0.028, -2], [0, -0.003, -1.7], [0, 0, 0], [3, 0, 0]]
-    ramps = plan(route(np.array(there), np.array([1.5] * 4 + [_RAPID]), 0.01), _ROUTER)
+    ramps = plan(route(np.array(there), np.array([1.5] * 4 + [_RAPID]), 0.01), _ROUTER, tubes=False)
     straight = route(
         np.array([[0, 0, 0], [0, 0, -2], [0, 0, 0], [3, 0, 0]]), np.array([1.5, 1.5, _RAPID]), 0.01
     )
     assert [leg.solver for leg in ramps.legs] == [OPTIMISED]
-    assert ramps.duration_s < plan(straight, _ROUTER).duration_s
+    assert ramps.duration_s < plan(straight, _ROUTER, tubes=False).duration_s

@@ -9,12 +9,14 @@ import pytest
 from cases.joint_optimum import corner, jog
 from judge.retiming import judge
 
+from olp.core.errors import CannotCompute
 from olp.trajectory.overlap import overlap
 from olp.trajectory.plan import plan
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.solvers import TUBE
 from olp.trajectory.stretches import runs_of
 from olp.trajectory.timespline import TimeSpline
+from olp.trajectory.tube import _Tube, in_tube
 
 LIMITS = AxisLimits(np.array([500.0, 400.0, 300.0]), np.array([5e3, 4e3, 3e3]), np.array([1e5, 8e4, 6e4]))
 
@@ -63,6 +65,43 @@ def test_more_feed_holds_behind_the_waypoint_and_not_within_the_tolerance_of_it(
     slow &= place[:, 0] < 7.0
     assert slow.sum() > 1000
     assert np.sqrt((velocity[slow] ** 2).sum(axis=1)).max() <= 20.0 * (1.0 + 1e-9)
+
+
+#: a small router, and a stroke into a hole whose backlash is taken up along ramps
+ROUTER = AxisLimits(np.array([33.0, 33, 12]), np.array([150.0, 150, 80]), np.array([5e3, 5e3, 3e3]))
+STROKE = np.array([[0, 0, 0], [0, -0.025, -0.3], [0, -0.028, -2], [0, -0.003, -1.7], [0, 0, 0], [3, 0, 0]])
+
+
+def strokes(count: int) -> Route:
+    """So many holes in a row. The tool turns back nearly, but no stop is needed."""
+    holes = [STROKE[1 if k else 0 :] + np.array([3.0 * k, 0.0, 0.0]) for k in range(count)]
+    point = np.concatenate(holes)
+    feed = np.tile([1.5, 1.5, 1.5, 1.5, np.inf], count)
+    band = np.full(len(point), 0.01)
+    band[[0, -1]] = 0.0
+    return Route(point, feed, np.arange(len(feed)), band, np.zeros(len(point)))
+
+
+@pytest.mark.slow
+def test_strokes_that_nearly_turn_back_are_planned_in_tubes_however_many_they_are() -> None:
+    """Such runs were too long, or their corners between rapids and feeds too short for the first cells."""
+    for count in (1, 12):
+        own = strokes(count)
+        found = plan(own, ROUTER)
+        assert judge(found.motion, own, ROUTER).wrong == ()
+        assert {leg.solver for leg in found.legs} == {TUBE}
+        assert found.duration_s < 0.993 * plan(own, ROUTER, tubes=False).duration_s
+
+
+@pytest.mark.parametrize(
+    ("middle", "good"), [((1.5, 3.0, 4.0, 3.0, 1.5), True), ((2.0, 4.0, 3.0, 4.0, 2.0), False)]
+)
+def test_a_motion_may_turn_with_its_route_and_not_twice(middle: tuple[float, ...], good: bool) -> None:
+    """There and back, each of its velocities leads along one of both segments; only their order tells."""
+    route = route_of(np.array([[0.0, 0.0], [4.0, 0.0], [0.5, 0.02]]), 0.05)
+    tube = _Tube.of(route, LIMITS, np.repeat([0, 1], 4))
+    x = np.concatenate((np.zeros(3), middle, np.full(3, 0.5)))
+    assert tube.forward(TimeSpline(np.column_stack((x, 0.0 * x, 0.1 * x)), np.ones(8))) is good
 
 
 def test_points_that_are_one_and_rapids_are_driven() -> None:
@@ -131,3 +170,10 @@ def test_slopes_are_those_of_differences() -> None:
                 elif axis == 2 and 0 <= own < 4:
                     expected = by_h[row, own]
                 assert np.allclose(change[-1][row], expected, rtol=1e-6, atol=1e-6)
+
+
+def test_a_run_that_is_passed_in_a_few_cells_is_refused_with_its_reason() -> None:
+    """Its tolerance is far larger than it is; it ended in an error of arrays, which nothing told."""
+    route = route_of(np.array([[0.0, 0.0], [1e-4, 0.0], [1e-4, 1e-4]]), 50.0)
+    with pytest.raises(CannotCompute, match="too few cells"):
+        in_tube(route, LIMITS, overlap(replace(route, tolerance_mm=np.zeros(3)), LIMITS))
