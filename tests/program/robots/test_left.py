@@ -216,6 +216,8 @@ STILL = """DEF made()
   LIN XP4
   IF x THEN
     $IPO_MODE=#TCP
+  ELSE
+    WAIT SEC 1
   ENDIF
   LIN XP5
 END

@@ -585,12 +585,12 @@ STILL_TASK = pgx("watch", "delay(1)")
 
 def test_a_task_that_moves_is_corrected_by_itself(bent: Path) -> None:
     """Moves beside it are corrected at their ends, and one that only watches changes nothing."""
-    move = "movel(pPoint[0],tGrip,mFast)"
-    plain = ["movej(pPoint[2],tGrip,mFast)", 'taskCreate "w",10,watch()', move]
-    text = made(plain, POINTS, TASK, STILL_TASK)
-    assert not any("begins depends" in f.message for f in olp.correct(text, bent).findings)
-    text = made([plain[0], "taskCreateSync sName,0.1,bLate,cycle()", move], POINTS, TASK, STILL_TASK)
+    moves = ["movel(pPoint[0],tGrip,mFast)", "movel(pPoint[2],tGrip,mFast)"]
+    text = made(['taskCreate "w",10,watch()', *moves], POINTS, TASK, STILL_TASK)
+    assert olp.correct(text, bent).report["moves"]["split"] == 1
+    text = made(["taskCreateSync sName,0.1,bLate,cycle()", *moves], POINTS, TASK, STILL_TASK)
     result = olp.correct(text, bent)
+    assert result.report["moves"]["split"] == 0
     told = [f.message for f in result.findings]
     assert any("cycle is a task of its own" in what and "with cycle.pgx in place" in what for what in told)
     assert any("begins depends on the run" in what for what in told)
