@@ -58,7 +58,8 @@ _TOOL_CODES = frozenset({60, 610})
 #: A word of a line as bytes, then a G code with what it does; and how these are taken apart.
 _WORD = np.dtype([("letter", np.uint8), ("value", np.float64), ("pointed", np.bool_)])
 _CODE = np.dtype([("code", np.int64), ("act", np.int64)])
-_WORD_PARTS, _CODE_PARTS = Struct("=Bd?"), Struct("=qq")
+_WORD_PARTS = Struct("=Bd?")
+_CODE_PARTS = Struct("=qq")
 
 
 #: The words of a line of the chunk and its G codes with what each does, as bytes. They are the same in lines
