@@ -22,6 +22,8 @@ from olp.proof.joint_places import ARM_MM, BATCH, Places, visited
 _HALF_DIGITS = 0.5 * np.sqrt(3.0)
 #: The same of two rotary words.
 _HALF_TURNS = 0.5 * np.sqrt(2.0)
+#: The rounding of one rotary word at most, in digits.
+_HALF_TURN = 0.5
 #: A move ends where its command is expected within so many digits.
 _NEAR_DIGITS = 4.0
 #: Moves more than planned among which the end of one is looked for at first.
@@ -176,6 +178,8 @@ def match(
         feed = nominal.feed & ~nominal.holes.whole
         # one that does not cut is gone past at most
         parts = np.where(feed | (parts > 1), parts, 0)
+        if nominal.listed is None and not isinstance(nominal, ArmPath):
+            near[:, ~rotary] += _taken_up(nominal, plan, last, digit_deg)[:, None]
         groups = _stretched(expected, corrected.end, near, parts, nominal.curves.mask | ~feed)
     away = np.nanmax(
         np.append(np.abs(corrected.end[groups] - expected), np.zeros((count, 1)), axis=1), axis=1
@@ -190,6 +194,17 @@ def match(
             code="OLP562",
         )
     return groups
+
+
+def _taken_up(path: JointPath, plan: JointPlan, rows: Index, digit_deg: float) -> Array:
+    """(r,) mm at rows of a plan by which linear words take up what the rounding of rotary ones does to the
+    tip. Their own digits may be finer, as in inches."""
+    found, known = np.zeros(len(rows)), np.isfinite(plan.axes[rows]).all(axis=1)
+    some = rows[known]
+    rotary = np.array([unit == "deg" for unit in path.motion.structure.units])
+    half = np.broadcast_to(np.where(rotary, _HALF_TURN * digit_deg, 0.0), (len(some), len(rotary)))
+    found[known] = _moved(path, plan.axes[some], path.tool[plan.move[some]], half)[0]
+    return found
 
 
 def _stretched(expected: Array, end: Array, near: Array, parts: Index, twice: Mask) -> Index:

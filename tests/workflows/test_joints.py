@@ -44,6 +44,24 @@ def test_the_judge_finds_the_corrected_path_within_tolerance(chain: str, tips: b
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("inch", [False, True])
+def test_linear_digits_that_are_finer_than_rotary_ones_keep_the_ends_of_moves(
+    inch: bool, tmp_path: Path
+) -> None:
+    """Linear words take up what 0.001 deg do to the tip, 3 um, which are many of their own digits."""
+    machine = machine_file(tmp_path, "C A Y F X Z", seed=3)
+    text = program("C A Y F X Z", seed=6)
+    if inch:
+        text = b"G20 G90 G54\nG0 X1. Y-2. Z3. A-20. C340.\nG1 X2. Y-1. C350. F50.\nX3. Z2. A-30. C360.\nM30\n"
+    else:
+        finer = re.sub(r"least_increment_mm = .*", "least_increment_mm = 0.00001", machine.read_text())
+        machine.write_text(finer)
+    result = olp.correct_joints(text, machine, tolerance_urad=2.0)
+    assert result.report["verdict"]["ok"], result.to_text()
+    assert inch or Judge(machine).judged(text, result.data)[0] < 1e-3
+
+
+@pytest.mark.slow
 def test_moves_shorter_than_their_errors_are_judged(tmp_path: Path) -> None:
     rng, place, lines = np.random.default_rng(1), np.array([0.0, 0.0, 0.0, -20.0, 30.0]), []
     for step in ([10.0] * 3 + [8.0] * 2, *3 * [[0.03] * 3 + [0.02] * 2]):
