@@ -778,7 +778,7 @@ def test_the_time_of_a_control_is_stated_and_learned_from_a_log(job: Path, tmp_p
     ("change", "message"),
     [
         (lambda rows: rows[: len(rows) // 2], "a whole run of this program, with positions in mm"),
-        (lambda rows: [[t, *(v / 25.4 for v in p)] for t, *p in rows], "over 3.5436"),
+        (lambda rows: [[t, *(v / 25.4 for v in p)] for t, *p in rows], "over 3.54"),
         (lambda rows: [[1000.0 * t, *p] for t, *p in rows], "with times in s"),
         (lambda rows: [*rows[:50], *rows[60:]], "its row 51 comes 0.011 s behind"),
         (lambda rows: rows[:20], "a whole run"),

@@ -458,11 +458,12 @@ def test_where_the_arm_starts_is_not_where_an_unread_move_left_it(
     assert caught.value.line == place + 2
 
 
-def test_a_straight_move_to_joints_is_refused(tmp_path: Path) -> None:
-    text = ur([("J", JOINTS)]).replace(b"movej", b"movel")
-    with pytest.raises(ProgramError, match="joints in a movel are not read; write the pose") as caught:
-        olp.correct_joints(text, arm_files(tmp_path))
-    assert caught.value.line == 4
+def test_a_straight_move_to_joints_is_corrected_as_one_that_is_not(tmp_path: Path) -> None:
+    text = ur([("J", JOINTS)])
+    straight = olp.correct_joints(text.replace(b"movej", b"movel"), arm_files(tmp_path)).data
+    assert straight != text and straight.count(b"movel") == 1
+    there = olp.correct_joints(text, arm_files(tmp_path)).data
+    assert straight.split(b"[")[1].split(b"]")[0] == there.split(b"[")[1].split(b"]")[0]
 
 
 @pytest.mark.slow
