@@ -20,8 +20,10 @@ _OF_WHOLE = 48
 _FINEST = 1.4
 #: share of that time below which no cell is halved
 _HALVED = 0.5
-#: knots of the motion closer than this share of a cell are one
+#: knots of the motion closer than this share of a cell are one, and so are waypoints of a step
 _SAME = 0.25
+#: both ends of a step are reached at one place where it is no longer than this times their tolerance
+_BOTH = 1.5
 #: cells at most: a run that needs more by its forecast is left as it is, and one that needs twice as many
 MOST_CELLS = 780
 #: cells at least: all coefficients of fewer are those of the ends
@@ -38,7 +40,7 @@ def cells_of(lasts: Array, tolerance_mm: Array, limits: AxisLimits) -> Array:
 def knots(route: Route, limits: AxisLimits, motion: Motion) -> tuple[Array, Index]:
     """Knots (m + 1,) s, and the segment (m,) of each cell: where the motion passes waypoints, and where its
     own cubics meet, and between so many that no cell is too long. Raises CannotCompute."""
-    passed = passing_s(route, motion)
+    passed = _at_once(route, passing_s(route, motion))
     lasts = np.diff(passed)
     most = np.minimum(lasts / _OF_SEGMENT, passed[-1] / _OF_WHOLE)
     most = np.maximum(most, _finest_s(route.tolerance_mm, limits))
@@ -75,6 +77,22 @@ def halved(
         return None
     middle = 0.5 * (knot_s[cell] + knot_s[cell + 1])
     return np.insert(knot_s, cell + 1, middle), np.insert(segment, cell, segment[cell])
+
+
+def _at_once(route: Route, passed: Array) -> Array:
+    """(n,) times at which waypoints are passed. Both ends of a step inside the tolerance are passed at once
+    where it lasts a small share of the segments beside it: a cell of such a step is too short."""
+    lasts = np.diff(passed)
+    step = np.diff(route.point_mm, axis=0)
+    least = np.minimum(route.tolerance_mm[:-1], route.tolerance_mm[1:])
+    inside = np.sqrt((step * step).sum(axis=1)) <= _BOTH * least
+    beside = np.minimum(np.append(np.inf, lasts[:-1]), np.append(lasts[1:], np.inf))
+    # the first and the last step end at rests
+    inside[[0, -1]] = False
+    short = np.flatnonzero(inside & (lasts < _SAME * beside))
+    passed = passed.copy()
+    passed[short] = passed[short + 1] = 0.5 * (passed[short] + passed[short + 1])
+    return passed
 
 
 def _finest_s(tolerance_mm: Array, limits: AxisLimits) -> Array:

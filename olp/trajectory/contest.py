@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -25,12 +26,17 @@ from olp.trajectory.optimise import optimised
 from olp.trajectory.route import Route
 from olp.trajectory.solvers import LAST, OPTIMISED, SOLVERS, TUBE, Candidate, Run, Solver
 from olp.trajectory.speedgrid import bound_s
+from olp.trajectory.spread import spread
 from olp.trajectory.tube import in_tube
 
 #: a limit may be reached; this share above it is rounding
 _ROUNDING = 1e-9
 #: share of the time that optimising has to gain
 _GAIN = 0.003
+#: share of the time that a search in a tube has to gain to be made again from its end ...
+_AGAIN = 2e-3
+#: ... and how often it is made
+_SEARCHES = 4
 #: share of the time that jerk costs in closed form which optimising does not recover
 _JERK_COST = 0.1
 #: waypoints beyond which short steps are not merged unless the run is optimised: a second path takes memory
@@ -70,8 +76,8 @@ def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Solu
             if candidate.solver.bends and own not in lines:
                 smooth.append(own)
     if optimise and best is not None and any(candidate.solver.bends for candidate in candidates):
-        # optimising takes most of the time: only along the path that is fastest in closed form
-        best = _optimised(run, best, min(smooth or [run], key=_closed_s))
+        # optimising takes most of the time: only along the path that promises most
+        best = _optimised(run, best, min(smooth or [run], key=_promised_s))
     asked = [candidate.solver for candidate in candidates]
     for solver in (*SOLVERS, LAST):
         if best is None and solver not in asked:
@@ -80,25 +86,39 @@ def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Solu
 
 
 def improved(run: Run, best: Solution) -> Solution:
-    """The motion of a run whose path and speed are planned together from the best one, where it is faster."""
-    motion = best.driven()
-    solver = Solver(TUBE, lambda run: in_tube(run.route, run.limits, motion), LAST.least_s, bends=True)
-    return _better(run, solver, best) or best
+    """The motion of a run whose path and speed are planned together from the best one, where it is faster. It
+    is planned again from that one, as long as that gains."""
+    for _ in range(_SEARCHES):
+        motion = best.driven()
+        solver = Solver(TUBE, partial(_from_motion, motion), LAST.least_s, bends=True)
+        found = _better(run, solver, best) or best
+        gained = found.duration_s < (1.0 - _AGAIN) * best.duration_s
+        best = found
+        if not gained:
+            break
+    return best
+
+
+def _from_motion(motion: Motion, run: Run) -> Motion:
+    return in_tube(run.route, run.limits, motion)
 
 
 def _entries(
     run: Run, candidates: tuple[Candidate, ...], optimise: bool
 ) -> tuple[list[tuple[Run, Candidate]], list[Run]]:
     """The solvers with the runs that they drive: the run itself, and its variants without short steps, with
-    corners moved outward, or over lines instead of noise; and the last ones."""
+    corners moved outward, over lines instead of noise, or, where speeds are optimised, with bends spread; and
+    those over lines."""
     entries = [(run, candidate) for candidate in candidates]
     lines: list[Run] = []
     if len(run.route) <= _LONG or optimise:
         bending = tuple(solver for solver in SOLVERS if solver.bends)
-        own = [(solver, Run(route, run.limits)) for route in variants(run.route) for solver in SOLVERS]
+        fewer = variants(run.route)
+        own = [(solver, Run(route, run.limits)) for route in fewer for solver in SOLVERS]
         level, moved = levelled(run.route), outward(run.route)
+        even = spread((fewer or [run.route])[0], run.limits) if optimise else None
         lines += [] if level is None else [Run(level, run.limits)]
-        bent = [*lines, *([] if moved is None else [Run(moved, run.limits)])]
+        bent = [*lines, *(Run(route, run.limits) for route in (moved, even) if route is not None)]
         own += [(solver, some) for some in bent for solver in bending]
         for solver, some in own:
             entries.append((some, Candidate(solver, float(solver.least_s(some.route, run.limits).sum()))))
@@ -136,6 +156,15 @@ def _closed_s(run: Run) -> float:
         return seconds(run.path(), run.profile())
     except _FAILURES:
         return math.inf
+
+
+def _promised_s(run: Run) -> float:
+    """About the time of optimised speeds along the smooth path; inf where there is none."""
+    closed = _closed_s(run)
+    if math.isinf(closed):
+        return closed
+    bound = bound_s(run.path(), run.limits)
+    return bound + _JERK_COST * (closed - bound)
 
 
 def _optimised(run: Run, best: Solution, own: Run) -> Solution:

@@ -26,13 +26,13 @@ from olp.trajectory.timespline import NODES, TimeSpline
 #: share of the time of a straight move that a motion takes longer, where a faster one is sought
 _GAIN = 3e-3
 #: share of the tolerance within which the search begins
-_BEGIN = 0.985
+_BEGIN = 0.998
 #: share of the tolerance by which the search begins beyond a waypoint where the feed changes
 _ACROSS = 0.04
 #: share of the tolerance that may be used
 _USED = 1.0 - 1e-6
 #: share of it beyond which a control point is pulled inside
-_OUTSIDE = 0.99
+_OUTSIDE = 0.999
 #: turns of pulling control points inside
 _PULLS = 30
 #: factor by which the search begins slower than the limits allow
