@@ -34,9 +34,9 @@ _ROUNDING = 1e-9
 #: share of the time that optimising has to gain
 _GAIN = 0.003
 #: share of the time that a search in a tube has to gain to be made again from its end ...
-_AGAIN = 2e-3
+_AGAIN = 2e-2
 #: ... and how often it is made
-_SEARCHES = 4
+_SEARCHES = 3
 #: share of the time that jerk costs in closed form which optimising does not recover
 _JERK_COST = 0.1
 #: waypoints beyond which short steps are not merged unless the run is optimised: a second path takes memory
