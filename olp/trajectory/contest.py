@@ -106,9 +106,9 @@ def _from_motion(motion: Motion, run: Run) -> Motion:
 def _entries(
     run: Run, candidates: tuple[Candidate, ...], optimise: bool
 ) -> tuple[list[tuple[Run, Candidate]], list[Run]]:
-    """The solvers with the runs that they drive: the run itself, and its variants without short steps, with
-    corners moved outward, over lines instead of noise, or, where speeds are optimised, with bends spread; and
-    those over lines."""
+    """The solvers with the runs that they drive, and those runs that are over lines instead of noise.
+    They are the run itself, and its variants without short steps, with corners moved outward, and over lines.
+    Where speeds are optimised, there is one with bends spread, too."""
     entries = [(run, candidate) for candidate in candidates]
     lines: list[Run] = []
     if len(run.route) <= _LONG or optimise:

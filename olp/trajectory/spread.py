@@ -1,12 +1,11 @@
 """Routes whose waypoints are moved within their tolerance so that the curvature changes little along them.
 
-Steps of a correction, noise and rounding bend a dense path to and fro. Rounded one by one, each bend takes
-the tolerance of its own waypoint. Spread along the path they are next to none.
+Steps of a correction, noise and rounding bend a dense path in both directions. Rounded one by one, each bend
+takes the tolerance of its own waypoint. Spread along the path they are next to none.
 
-The sum of squares of third divided differences of the waypoints by the arc length, and of how far they are
-moved, is made least, as in a smoothing spline (C. H. Reinsch, "Smoothing by spline functions", Numerische
-Mathematik 10 (1967), eq. (1) with a third derivative). Waypoints that would leave their room are held more
-firmly, until none does.
+What is made least is the sum of squares of third divided differences by the arc length, and of how far
+waypoints are moved. That is a smoothing spline: C. H. Reinsch, "Smoothing by spline functions", Numerische
+Mathematik 10 (1967). Waypoints that would leave their room are held more firmly, until none does.
 """
 
 from __future__ import annotations

@@ -125,7 +125,8 @@ def _result(
 ) -> ThermalFit:
     """The fit to all logs at these lags."""
     rises = problem.rises(lags)
-    condition = problem.condition(rises)
+    # sensors that change together before they lag do so with any lags
+    condition = max(problem.condition(some) for some in (rises, problem.rises(dict.fromkeys(lags, 0.0))))
     if condition > MOST_CONDITION:
         raise CannotCompute(
             f"the sensors {', '.join(problem.names)} change together (condition {condition:.0f}), so their "
