@@ -114,9 +114,9 @@ def test_exact_stops_take_the_time_that_they_take_linuxcnc(
 
 CONTINUOUS: dict[str, tuple[str, Callable[[], list[str]], float]] = {
     # half of the acceleration in each of two moves that blend in a parabola
-    "square, 10 um": ("G64 P0.01 Q0", square, 0.96),
+    "square, 10 um": ("G64 P0.01 Q0", square, 0.94),
     # ours uses the tolerance on both sides of the corner and of the moves beside it
-    "square, 0.5 mm": ("G64 P0.5 Q0", square, 0.85),
+    "square, 0.5 mm": ("G64 P0.5 Q0", square, 0.84),
     # speed-limited on both sides; ours brakes where the curve needs it, once
     "contour, 10 um": ("G64 P0.01 Q0", lobes, 0.95),
     # sqrt(3)/2 of the acceleration is kept for the centre, 1/2 along the arc; ours shares as they are used

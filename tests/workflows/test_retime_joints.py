@@ -139,7 +139,8 @@ def test_linear_moves_take_the_time_that_they_take_three_axes(tmp_path: Path) ->
     start = b"G21 G90 G17 G94 G54 G49 G64\nG0 X0. Y0. Z50.%s\n"
     one = olp.retime((start % b"").replace(b"G49", b"") + moves, three, blend_mm=0.05).duration_s
     other = olp.retime_joints(start % b" A0. C0." + moves, five, blend_mm=0.05).duration_s
-    assert other == pytest.approx(one, rel=1e-3)
+    # three axes plan path and speed together
+    assert 0.999 * one <= other <= 1.03 * one
 
 
 @pytest.mark.slow
