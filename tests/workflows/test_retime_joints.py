@@ -124,7 +124,7 @@ def test_arcs_are_kept_and_take_their_time(turns: int) -> None:
 def test_linear_moves_take_the_time_that_they_take_three_axes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The same limits, the same program, without and with rotary axes that stand. Tubes are for linear axes."""
+    """The same limits, the same program, without and with rotary axes that stand. Three have tubes."""
 
     def none(*args: object) -> None:
         raise CannotCompute("no tube")
