@@ -25,7 +25,6 @@ from olp.trajectory.motion import Motion
 from olp.trajectory.optimise import optimised
 from olp.trajectory.route import Route
 from olp.trajectory.solvers import LAST, OPTIMISED, SOLVERS, TUBE, Candidate, Run, Solver
-from olp.trajectory.speedgrid import bound_s
 from olp.trajectory.spread import spread
 from olp.trajectory.tube import in_tube
 
@@ -158,25 +157,20 @@ def _closed_s(run: Run) -> float:
         return math.inf
 
 
-def _promised_s(run: Run) -> float:
-    """About the time of optimised speeds along the smooth path; inf where there is none."""
+def _promised_s(run: Run, most_s: float = math.inf) -> float:
+    """About the time of optimised speeds along the smooth path, where some motion takes `most_s` at most; inf
+    where there is no such path."""
     closed = _closed_s(run)
     if math.isinf(closed):
         return closed
-    bound = bound_s(run.path(), run.limits)
-    return bound + _JERK_COST * (closed - bound)
+    return run.bound_s() + _JERK_COST * (min(closed, most_s) - run.bound_s())
 
 
 def _optimised(run: Run, best: Solution, own: Run) -> Solution:
     """The motion of optimised speed along the smooth path of `own`, where it is faster."""
-    closed = _closed_s(own)
-    if math.isinf(closed):
+    if _promised_s(own, best.duration_s) > (1.0 - _GAIN) * best.duration_s:
         return best
     path, profile = own.path(), own.profile()
-    bound = bound_s(path, run.limits)
-    least = bound + _JERK_COST * (min(closed, best.duration_s) - bound)
-    if least > (1.0 - _GAIN) * best.duration_s:
-        return best
     solver = Solver(OPTIMISED, lambda run: optimised(path, run.limits, profile), LAST.least_s, bends=True)
     return _better(run, solver, best) or best
 

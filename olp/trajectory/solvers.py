@@ -15,6 +15,7 @@ from olp.trajectory.motion import Motion
 from olp.trajectory.overlap import least_s, overlap
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.smooth import SmoothPath, smooth
+from olp.trajectory.speedgrid import bound_s
 
 #: names of the solvers in a report
 OVERLAP = "overlapped moves"
@@ -34,6 +35,7 @@ class Run:
         self.limits = limits
         self._path: SmoothPath | None = None
         self._profile: Profile | None = None
+        self._bound_s: float | None = None
 
     def path(self) -> SmoothPath:
         """The smooth path. Raises CannotCompute as `smooth`."""
@@ -46,6 +48,12 @@ class Run:
         if self._profile is None:
             self._profile = best_profile(self.path(), self.limits)
         return self._profile
+
+    def bound_s(self) -> float:
+        """About the least seconds along the path without a jerk limit. Raises as `path`."""
+        if self._bound_s is None:
+            self._bound_s = bound_s(self.path(), self.limits)
+        return self._bound_s
 
 
 @dataclass(frozen=True, slots=True, eq=False)

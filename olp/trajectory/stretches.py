@@ -29,7 +29,7 @@ _CALL = 500
 _BLOCK = 1 << 15
 #: waypoints of runs that are planned together, as a call costs more than a move
 _TOGETHER = 1 << 15
-#: cells of tubes at most, about 12 s
+#: cells of tubes at most, about 12 s for each time that all are searched
 _CELLS = 4000
 #: cells that take as long as the fixed cost of a tube
 _OF_TUBE = 30
@@ -108,9 +108,7 @@ def together(runs: list[Stretch]) -> Iterator[Stretch]:
     begin = 0
     group: list[Stretch] = []
     for run in [*runs, None]:
-        small = (
-            run is not None and not run.tube and not (run.bends and (run.optimise or run.segments > SHORT))
-        )
+        small = run is not None and not run.tube and not run.alone
         if group and (run is None or not small or run.last - begin > _TOGETHER):
             candidates = max((some.candidates for some in group), key=len)
             yield Stretch(begin, group[-1].last, candidates, len(group))
