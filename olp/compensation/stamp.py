@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from olp.core.errors import AlreadyCorrected
 from olp.core.patterns import pattern
 from olp.core.spool import Text, matches
 from olp.core.version import __version__
@@ -30,6 +31,23 @@ def find_real_time(text: Text) -> re.Match[bytes] | None:
 def find_stamp(text: Text) -> re.Match[bytes] | None:
     """The stamp in a text that is corrected already."""
     return next(matches(_STAMP, text), None)
+
+
+def line_of(text: Text, stamp: re.Match[bytes]) -> int:
+    """The line of a stamp in its text."""
+    return text.count(b"\n", 0, stamp.start()) + 1
+
+
+def refuse_second(text: Text) -> None:
+    """Raises AlreadyCorrected for a text that has the stamp of a correction."""
+    stamp = find_stamp(text)
+    if stamp is not None:
+        raise AlreadyCorrected(
+            f"the program has the stamp `{stamp.group().decode()}` of a correction; a second one would apply "
+            "the model twice; correct the nominal program",
+            line=line_of(text, stamp),
+            code="OLP560",
+        )
 
 
 def is_of(stamp: re.Match[bytes], digest: str) -> bool:

@@ -13,12 +13,12 @@ import numpy as np
 
 from olp.checks import correction as checks
 from olp.compensation.planning import written_plans
-from olp.compensation.stamp import find_real_time, find_stamp, stamped
+from olp.compensation.stamp import find_real_time, find_stamp, refuse_second, stamped
 from olp.compensation.tally import Tally
 from olp.compensation.writer import Task
 from olp.compensation.writing import write
 from olp.core.arrays import Array, Index, read_only
-from olp.core.errors import AlreadyCorrected, ProgramError, UsageError
+from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, part, silent
 from olp.core.spool import Spool, Text, whole
@@ -196,7 +196,7 @@ def corrected(
 ) -> Run:  # fmt: skip
     """Correct a program and prove it; `outside` is the code of findings outside the box, whose error is that
     at its face. Without `refuse_doubts` they are findings alone. Raises as `correct`."""
-    _refuse_stamped(program.data)
+    refuse_second(program.data)
     loaded = loaded.reading(program)
     done = _rewritten(sources, program, loaded, options, refuse_doubts, tell)
     try:
@@ -252,17 +252,6 @@ def _as_good(kept: Run, unrolled: Run) -> bool:
     """Whether a program that kept its flow is as near to the nominal path as unrolled, but for rounding."""
     digit_mm = kept.proof.digit_mm
     return not unrolled.proof.holds and kept.proof.largest_mm <= unrolled.proof.largest_mm + 2 * digit_mm
-
-
-def _refuse_stamped(data: Text) -> None:
-    stamp = find_stamp(data)
-    if stamp:
-        raise AlreadyCorrected(
-            f"the program has the stamp `{stamp.group().decode()}` of a correction; a second one would apply "
-            "the model twice; correct the nominal program",
-            line=data.count(b"\n", 0, stamp.start()) + 1,
-            code="OLP560",
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

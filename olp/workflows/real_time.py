@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import re
-
-from olp.compensation.stamp import find_real_time, find_stamp, is_of
+from olp.compensation.stamp import find_real_time, find_stamp, is_of, line_of
 from olp.core.errors import AlreadyCorrected, ConfigError, ProgramError
 from olp.core.machine import Machine
-from olp.core.spool import Text
 from olp.errormodel.calibration import Calibration
 from olp.files.sources import Source
 
@@ -35,7 +32,7 @@ def refuse_stamped(real_time: str | None, digest: str, program: Source) -> None:
             f"the program has the stamp `{stamp.group().decode()}` of a correction. The control corrects in "
             f'real time too (real_time = "{real_time}"): both would apply the model twice; run the '
             "nominal program, or switch the correction of the control off and leave real_time out",
-            line=_line(data, stamp),
+            line=line_of(data, stamp),
             code="OLP560",
         )
     needs = find_real_time(data)
@@ -44,13 +41,9 @@ def refuse_stamped(real_time: str | None, digest: str, program: Source) -> None:
             f"the program has the stamp `{needs.group().decode()}`: it needs a control that corrects by this "
             "calibration in real time. The machine file does not state that (real_time); correct the program "
             "without the stamp, or state what the control does",
-            line=_line(data, needs),
+            line=line_of(data, needs),
             code="OLP560",
         )
-
-
-def _line(data: Text, stamp: re.Match[bytes]) -> int:
-    return data.count(b"\n", 0, stamp.start()) + 1
 
 
 def refuse_correcting(machine: Machine) -> None:

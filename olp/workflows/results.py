@@ -13,7 +13,7 @@ import numpy as np
 
 from olp.checks.doubt import stated_doubts
 from olp.checks.doubt_size import box_doubts
-from olp.compensation.stamp import find_stamp, stamp_line
+from olp.compensation.stamp import find_stamp, line_of, stamp_line
 from olp.core.errors import AlreadyCorrected, InputError, UsageError
 from olp.core.machine import Setup
 from olp.core.spool import Spool, whole
@@ -146,7 +146,7 @@ def _corrected(
         raise AlreadyCorrected(
             f"the results have the stamp `{stamp.group().decode()}` of a correction; a second one would add "
             "the error twice; correct the file that the machine wrote",
-            line=data.count(b"\n", 0, stamp.start()) + 1,
+            line=line_of(data, stamp),
             code="OLP560",
         )
     reported = _read(data, layout)

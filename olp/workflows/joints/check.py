@@ -10,7 +10,7 @@ from typing import Any
 
 from olp.checks.base import finding
 from olp.checks.stamps import stamp_findings
-from olp.compensation.stamp import find_stamp
+from olp.compensation.stamp import find_stamp, line_of
 from olp.core.errors import AlreadyCorrected, ProgramError
 from olp.core.spool import Text
 from olp.core.values import dataclass
@@ -120,10 +120,12 @@ def examined(run: JointRun, corrected: Source | None, options: JointCheckOptions
 
 
 def _refuse_stamped(program: Source) -> None:
-    if find_stamp(program.data) is not None:
+    stamp = find_stamp(program.data)
+    if stamp is not None:
         raise AlreadyCorrected(
             "the program is corrected already; name its nominal program with --nominal, and it is proved "
             "against that one",
+            line=line_of(program.data, stamp),
             code="OLP560",
         )
 

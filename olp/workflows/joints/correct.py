@@ -15,10 +15,10 @@ from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointLimits, JointPlan
 from olp.compensation.joints.writer import WrittenJoints
 from olp.compensation.joints.writing import planned_words, write_joints
-from olp.compensation.stamp import find_real_time, find_stamp, stamp_line, stamped
+from olp.compensation.stamp import find_real_time, refuse_second, stamp_line, stamped
 from olp.compensation.tally import Tally
 from olp.compensation.wrapping import card_stamp
-from olp.core.errors import AlreadyCorrected, OutsideBox
+from olp.core.errors import OutsideBox
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.core.values import dataclass
 from olp.files.sources import Source
@@ -205,14 +205,7 @@ def proved(
 
 def _refuse_stamped(run: JointRun) -> None:
     real_time.refuse_stamped(run.machine.real_time, run.digest, run.program)
-    stamp = find_stamp(run.program.data)
-    if stamp:
-        raise AlreadyCorrected(
-            f"the program has the stamp `{stamp.group().decode()}` of a correction; a second one would apply "
-            "the model twice; correct the nominal program",
-            line=run.program.data.count(b"\n", 0, stamp.start()) + 1,
-            code="OLP560",
-        )
+    refuse_second(run.program.data)
 
 
 def _refuse_outside(path: JointPath, plan: JointPlan, run: JointRun) -> None:
