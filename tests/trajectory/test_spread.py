@@ -36,6 +36,17 @@ def test_steps_and_noise_are_spread() -> None:
         assert roughness(even) < share * roughness(own)
 
 
+def test_a_waypoint_that_cannot_move_far_enough_holds_back_none_far_from_it() -> None:
+    own = noisy()
+    own.point_mm[150] *= 1.003
+    even = spread(own, LIMITS)
+    assert even is not None
+    inner = slice(200, 290)
+    parts = (replace(one, point_mm=one.point_mm[inner]) for one in (own, even))
+    before, after = (roughness(part) for part in parts)
+    assert after < 0.3 * before
+
+
 @pytest.mark.parametrize("factor", (1.0, 0.1, 1e-3))
 def test_no_waypoint_leaves_its_tolerance_and_no_rest_its_place(factor: float) -> None:
     own = noisy()
