@@ -22,7 +22,6 @@ _SPEED = pattern(rb"(?i)\$VEL\.CP\s*=\s*([+-]?(?:\d+\.?\d*|\.\d+))")
 _ANY_SPEED = pattern(rb"(?i)\$VEL(?:\.CP)?\s*=")
 _MODE = pattern(rb"(?i)\$IPO_MODE\s*=\s*(.*?)\s*")
 _ANY_STILL = pattern(rb"(?i)\$IPO_MODE\s*=\s*#TCP\b")
-_ANY_TAUGHT = pattern(rb"(?i)FDAT_ACT\s*=\s*(\w+)")
 _WORLD = pattern(rb"(?i)\$(?:NULLFRAME|WORLD)")
 _NUMBERED = pattern(rb"(?i)(?:BASE|TOOL)_DATA\s*\[\s*(\d+)\s*\]")
 #: Functions of inline forms that give the tool or the base of a taught point.
@@ -72,7 +71,7 @@ class Active:
     @functools.cached_property
     def _any_still(self) -> bool:
         """Whether the text may set a tool that stands still."""
-        points = set(_ANY_TAUGHT.findall(self.data)) if b"#TCP" in self.data.upper() else ()
+        points = set(_TAUGHT.findall(self.data)) if b"#TCP" in self.data.upper() else ()
         taught = (self.declared.taught(key_of(name, None)) for name in points)
         return _ANY_STILL.search(self.data) is not None or any(own and own.fixed for own in taught)
 
