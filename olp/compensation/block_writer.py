@@ -263,13 +263,15 @@ class BlockWriter(Writer):
             self._next_capture += 1
         chosen = captures[begin : self._next_capture]
         word = np.array([capture.word for capture in chosen], np.int64)
-        columns = (self.words.number[word], self.words.end[word], self.words.mantissa[word])
+        axis = np.array([capture.axis for capture in chosen], np.int64)
+        columns = (
+            self.words.number[word], self.words.end[word], self.words.mantissa[word],
+            self.style.decimals(word, axis, np.array([c.unit_mm for c in chosen])),
+        )  # fmt: skip
         away_mm = self._moved_mm(rows, chosen)
-        for k, (start, end, own) in enumerate(zip(*(column.tolist() for column in columns), strict=True)):
+        for k, (start, end, own, written) in enumerate(zip(*(c.tolist() for c in columns), strict=True)):
             capture = chosen[k]
-            grid = self.style.grid(capture.axis, capture.unit_mm)
-            written = self.style.decimals_of(capture.word, capture.axis, capture.unit_mm)
-            digits = max(grid, written)
+            digits = max(self.style.grid(capture.axis, capture.unit_mm), written)
             before = own * 10 ** (digits - written)
             new = before + round(away_mm[k] / capture.unit_mm * 10**digits)
             if new != before:

@@ -76,23 +76,21 @@ class Style:
         )  # fmt: skip
 
     def decimals(
-        self, slot: Slots, axis: int, unit_mm: float | npt.NDArray[np.float64]
+        self, slot: Slots, axis: int | npt.NDArray[np.int64], unit_mm: float | npt.NDArray[np.float64]
     ) -> npt.NDArray[np.int64]:
-        """Digits behind the point of words, counting the hidden ones of numbers in least increments."""
+        """Digits behind the point of words, counting the hidden ones of numbers in least increments. All are
+        of one axis and unit, or each of its own."""
         words = self.program.words
         assert words is not None
         digits = words.decimals[slot].astype(np.int64)
         if not self.program.calculator:
-            hidden = self.bare_decimals[axis] + (np.asarray(unit_mm) != 1.0)
+            hidden = np.array(self.bare_decimals)[axis] + (np.asarray(unit_mm) != 1.0)
             digits = np.where(words.pointed[slot], digits, hidden)
         return digits
 
     def decimals_of(self, slot: int, axis: int, unit_mm: float) -> int:
         """The same for one word."""
-        words = self.program.words
-        assert words is not None
-        hidden = not self.program.calculator and not words.pointed[slot]
-        return self.bare_decimals[axis] + (unit_mm != 1.0) if hidden else int(words.decimals[slot])
+        return int(self.decimals(np.array([slot]), axis, unit_mm)[0])
 
     def lead(self, word: int) -> bytes:
         """The space before a word; of a first word, the usual one."""
