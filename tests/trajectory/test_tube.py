@@ -39,6 +39,12 @@ def tubes_of(route: Route) -> float:
     return found.duration_s
 
 
+def test_a_sharp_corner_of_long_moves_has_cells_fine_enough() -> None:
+    """A spline with cells for 100 mm leaves a tolerance of 5 um at the corner, so there they are halved."""
+    route = route_of(np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 80.0]]), 0.005)
+    assert tubes_of(route) < 0.999 * plan(route, LIMITS, tubes=False).duration_s
+
+
 def test_a_corner_is_faster_than_by_any_method_alone() -> None:
     route = route_of(corner(45.0, 5.0), 0.1)
     assert tubes_of(route) < 0.997 * plan(route, LIMITS, tubes=False).duration_s
