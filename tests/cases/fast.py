@@ -18,6 +18,14 @@ def some_fast(cases: Iterable[Any], each: int) -> list[Any]:
     ]
 
 
+def some_of_a_campaign(cases: Iterable[Any], each: int) -> list[Any]:
+    """The cases of a slow test, all but one in `each` left to a campaign before a release."""
+    values = [case if isinstance(case, tuple) else (case,) for case in cases]
+    return [
+        pytest.param(*value, marks=pytest.mark.campaign if k % each else ()) for k, value in enumerate(values)
+    ]
+
+
 def in_each(cases: Iterable[Case], name: Callable[[Case], str]) -> Callable[[Callable[[Case], None]], Any]:
     """One test for a law of many cases that takes no time each: what broke it, by the name of its case."""
 

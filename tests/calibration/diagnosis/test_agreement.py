@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from cases.calibration import case, cloud, rays, residual_of
+from cases.fast import some_of_a_campaign
 from judge.simulated import OFFSETS
 
 from olp.calibration.diagnosis.agreement import Agreement, Compared, Tried, compared
@@ -58,14 +59,14 @@ def times(file: str, factor: float) -> Callable[[Line], Line]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("family", "seed", "kinds"), SOUND)
+@pytest.mark.parametrize(("family", "seed", "kinds"), some_of_a_campaign(SOUND, 3))
 def test_without_a_mistake_nothing_is_found(family: str, seed: int, kinds: str) -> None:
     outcome = found(seed, family, kinds)
     assert not outcome.wrong and not outcome.unlike
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "file", "factor", "words"), PLANTED)
+@pytest.mark.parametrize(("seed", "file", "factor", "words"), some_of_a_campaign(PLANTED, 3))
 def test_a_planted_mistake_is_named(seed: int, file: str, factor: float, words: str) -> None:
     outcome = found(seed, "rough", "p", times(file, factor))
     assert [one.label for one in outcome.wrong] == [file]

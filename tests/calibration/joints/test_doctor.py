@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calibration.joints.simulated import known_machine, read
+from cases.fast import some_of_a_campaign
 
 from olp.calibration.joints.adjustment import JointFit
 from olp.calibration.joints.deciding import DECIDED
@@ -110,7 +111,7 @@ CASES += [*(("xyzac_trunnion", what) for what in BLUNDERS), ("scara", "two postu
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "what"), CASES)
+@pytest.mark.parametrize(("name", "what"), some_of_a_campaign(CASES, 2))
 def test_mistakes_of_readings_are_told_with_odds(name: str, what: str) -> None:
     known, usual, fit, reading = judged(name)
     assert isinstance(reading, Points)
@@ -148,7 +149,8 @@ def test_a_calibration_that_is_right_raises_no_alarm() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "kind"), [*zip(STRUCTURES, 4 * ("points", "poses", "lengths"), strict=True)]
+    ("name", "kind"),
+    some_of_a_campaign(zip(STRUCTURES, 4 * ("points", "poses", "lengths"), strict=True), 2),
 )
 def test_no_structure_raises_a_false_alarm(name: str, kind: str) -> None:
     known, usual, fit, reading = judged(name, 1, kind)

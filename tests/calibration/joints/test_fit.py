@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from calibration.joints.simulated import SIGMA, TOOL, read, true_machine
+from cases.fast import some_of_a_campaign
 from cases.joint_campaigns import Campaign
 
 from olp.calibration.joints.adjustment import JointFit, fit_joints, held_out
@@ -39,7 +40,14 @@ def whitened(fit: JointFit, theta: Array) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("name", "kind"), [*CASES, *(pytest.param(*case, marks=pytest.mark.slow) for case in REST)]
+    ("name", "kind"),
+    [
+        *CASES,
+        *(
+            pytest.param(*case, marks=(pytest.mark.slow, *(() if k % 2 else (pytest.mark.campaign,))))
+            for k, case in enumerate(REST)
+        ),
+    ],
 )
 def test_what_is_measured_is_found(name: str, kind: str) -> None:
     """Without noise the fit is what the machine is less the pull of the prior, which linear theory states:
@@ -78,10 +86,10 @@ def coverage(name: str, kind: str, runs: int, count: int = 60) -> tuple[float, f
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "kind", "runs"),
-    [
+    some_of_a_campaign([
         ("arm_6r_kr6", "points", 12), ("xyzac_trunnion", "points", 15), ("gantry_wrist", "lengths", 15),
         ("polar_rppr", "lengths", 15), ("tripod", "points", 25),
-    ],
+    ], 2),
 )  # fmt: skip
 def test_the_fit_is_as_good_as_the_readings_allow(name: str, kind: str, runs: int) -> None:
     """The covariance of a linear Gaussian fit is the information limit: errors are within 1.15 of it. There
@@ -180,12 +188,15 @@ def moved(reading: Points, how: str) -> Points:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "words"),
-    [
-        ("sign", "axis J3 runs the other way"),
-        ("radians", "axis J4 is in radians"),
-        ("posture", "one posture"),
-        ("nests", "3 and 1 are swapped"),
-    ],
+    some_of_a_campaign(
+        [
+            ("sign", "axis J3 runs the other way"),
+            ("radians", "axis J4 is in radians"),
+            ("posture", "one posture"),
+            ("nests", "3 and 1 are swapped"),
+        ],
+        2,
+    ),
 )
 def test_mistakes_are_told(how: str, words: str) -> None:
     model, theta, values = true_machine("arm_6r_kr6", count=40)

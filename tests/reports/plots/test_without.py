@@ -10,8 +10,8 @@ from cli.test_cli import PROGRAMS, run
 import olp
 from olp.core.optional import require_matplotlib
 
-MACHINE = PROGRAMS / "table-router" / "machine.toml"
-PROGRAM = PROGRAMS / "table-router" / "outline.ngc"
+MACHINE = PROGRAMS / "nasty" / "machine.toml"
+PROGRAM = PROGRAMS / "nasty" / "modal.ngc"
 LINES = PROGRAMS / "gantry-lines"
 
 
