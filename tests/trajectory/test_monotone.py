@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from cases.trajectory import route
 
 from olp.trajectory.plan import plan
@@ -45,7 +46,7 @@ def mixed(seed: int) -> Route:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", some_of_a_campaign(range(4), 2))
 def test_less_freedom_is_no_gain(seed: int) -> None:
     own = mixed(seed)
     rng = np.random.default_rng(100 + seed)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from cases.fast import some_fast
+from cases.fast import some_fast, some_of_a_campaign
 from fuzz import grammar
 from judge.machines import Recipe, random_machine
 from judge.programs import FEATURES, LOOSE, random_program
@@ -90,7 +90,7 @@ def test_a_size_of_bands_gives_the_same_of_some_that_are_shipped(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", some_fast(range(24), 24))
+@pytest.mark.parametrize("seed", some_of_a_campaign(range(24), 2))
 def test_any_size_of_bands_gives_the_same_of_random_programs(
     seed: int, machine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -100,7 +100,7 @@ def test_any_size_of_bands_gives_the_same_of_random_programs(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(0, 200, 5))
+@pytest.mark.parametrize("seed", some_of_a_campaign(range(0, 200, 5), 3))
 def test_any_size_of_bands_gives_the_same_of_mixed_blocks(
     seed: int, machine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
