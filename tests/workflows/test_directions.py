@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from cases.joint_machines import machine_file, program
 from judge.five_axis import Judge
 
@@ -43,7 +44,7 @@ def directed(judge: Judge, text: bytes, control: str) -> bytes:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("control", ["fanuc", "sinumerik"])
-@pytest.mark.parametrize("chain", CHAINS)
+@pytest.mark.parametrize("chain", some_of_a_campaign(CHAINS, 2))
 def test_directions_are_corrected_as_the_judge_finds(chain: str, control: str, tmp_path: Path) -> None:
     machine = machine_file(tmp_path, chain, control=control)
     judge = Judge(machine)
@@ -90,7 +91,7 @@ def as_blocks(text: bytes) -> bytes:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("chain", CHAINS)
+@pytest.mark.parametrize("chain", some_of_a_campaign(CHAINS[::-1], 2))
 def test_points_with_directions_are_corrected_as_the_judge_finds(chain: str, tmp_path: Path) -> None:
     machine, job = machine_file(tmp_path, chain, control="fanuc"), tmp_path / "job.toml"
     job.write_text(STARTS["A" in chain])

@@ -35,6 +35,7 @@ def test_random_programs_keep_every_limit(base: olp.Setup) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 def test_random_programs_keep_every_limit_at_length(base: olp.Setup) -> None:
     """More of them: tests/fuzz/fuzz_retime.py."""
     assert faults(range(100, 125), base) == {}
@@ -65,7 +66,7 @@ def test_samples_of_linuxcnc_keep_every_limit(tmp_path: Path) -> None:
     path = spacious(tmp_path, (0.0, 0.0, 0.0))
     setup = olp.load_setup(path, path.with_name("job.toml"))
     done, wrong = 0, {}
-    for sample in samples()[::2]:
+    for sample in samples()[::3]:
         try:
             flat = olp.flatten(sample, path)
             linuxcnc.interpret(flat, path, find_known=False)
