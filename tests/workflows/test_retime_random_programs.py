@@ -16,6 +16,8 @@ from olp.core.errors import ProgramError
 
 #: Bytes of a program that takes long to re-time.
 LONG = 20_000
+#: Programs whose motion takes minutes to plan and judge.
+LONGEST = ("gantry-plate/plate.ngc", "table-router/front.ngc")
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +44,9 @@ def test_random_programs_keep_every_limit_at_length(base: olp.Setup) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", JOBS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.campaign if name in LONGEST else ()) for name in JOBS]
+)
 def test_shipped_programs_and_their_corrections_keep_every_limit(name: str) -> None:
     path = FOLDER / name
     machine, job = path.with_name("machine.toml"), path.with_name(JOBS[name])
