@@ -100,6 +100,8 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     **dict.fromkeys((b"THREAD", b"NURBS", b"SPLINE", b"BSPLIN", b"POLYLN", b"PIERCE"), (_NO, _CYCLE)),
     b"SWITCH": (_NO, "states the output point of a turning tool, and lathes are not corrected; send the "
                "program of a mill"),
+    b"PPFUN": (_NO, "calls a function of the post-processor, and some change what later points mean; take it "
+              "out where its manual says that it changes no position"),
     b"SYN": (_NO, "gives words another meaning in the post-processor; write the statements without it"),
     b"MIRROR": (_NO, "mirrors coordinates in the post-processor; have the CAM system write the moved points"),
 }  # fmt: skip

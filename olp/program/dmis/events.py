@@ -79,7 +79,7 @@ class Events:
                 f"RECALL brings the sensor {self.recalled[0]} back, and whether it selects it too is not "
                 "known; put SNSLCT behind it",
                 line=self.recalled[1],
-                code="OLP542",
+                code="OLP516",
             )
         what = "the frame of the machine" if self.datum == MACHINE_FRAME else f"the datum D({self.datum})"
         name = next(
@@ -204,9 +204,10 @@ class Events:
         match = _LABEL.match(fields[0].text) if fields else None
         if match is None or match[1] == b"RT":
             raise ProgramError(
-                "RECALL is read for datums, sensors and features only: D(), DA(), S(), SA(), F() or FA()",
+                "RECALL is read for datums, sensors and features only; give D(), DA(), S(), SA(), F() "
+                "or FA()",
                 line=statement.line,
-                code="OLP542",
+                code="OLP516",
             )
         kind, name = match[1], match[2].decode("latin-1")
         if kind not in (b"D", b"DA", b"S", b"SA"):

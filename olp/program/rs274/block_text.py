@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from dataclasses import field
 
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
@@ -44,6 +46,7 @@ class BlockText:
     - `unread`: words that mean nothing for the path and have no letter, such as the number of a spindle; its
       group, where it has one. Each has the byte `unread_mark`.
     - `longest`: bytes of a line at most, without its line feed (None: no limit).
+    - `outside`: by name, how lines begin that are no blocks, and why a program cannot have them.
     """
 
     odd_bytes: re.Pattern[bytes] | None = STRAY_CR
@@ -57,6 +60,7 @@ class BlockText:
     unread: re.Pattern[bytes] | None = None
     unread_mark: int = 0
     longest: int | None = None
+    outside: Mapping[str, tuple[re.Pattern[bytes], str]] = field(default_factory=dict)
 
     @property
     def line_end(self) -> re.Pattern[bytes]:
@@ -72,6 +76,10 @@ class BlockText:
                 code="OLP505",
             )
         line = line.rstrip(b"\r")
+        for begin, why in self.outside.values():
+            if begin.match(line):
+                shown = line.strip()[:_SHOWN_OF_LINE].decode("latin-1")
+                return ProgramError(f"`{shown}` {why}", code="OLP512")
         odd = None if self.odd_bytes is None else self.odd_bytes.search(line)
         if odd is None and not self.skips_control:
             odd = CONTROL.search(_COMMENTS.sub(lambda comment: b" " * len(comment[0]), line))

@@ -262,10 +262,11 @@ FIXED = "PROBE,FIXED,CART,0,4,-20"
         ("SNSLCT/LONG", 3, "OLP516", "SNSLCT names no sensor"),
         ("SNSLCT/S(NONE)\nGOTO/1,2,3", 4, "OLP522", r'the stylus NONE is selected, .* \[styli\."NONE"\]'),
         ("TRANS/XORIG,1", 3, "OLP516", "TRANS has no label"),
-        ("RECALL/RT(1)", 3, "OLP542", "RECALL is read for datums, sensors and features only"),
-        ("RECALL", 3, "OLP542", "RECALL is read for datums, sensors and features only"),
-        ("RECALL/ALIGN,'P'", 3, "OLP542", "RECALL is read for datums, sensors and features only"),
-        ("RECALL/S(A)\nGOTO/1,2,3", 3, "OLP542", "RECALL brings the sensor A back"),
+        ("RECALL/RT(1)", 3, "OLP516", r"RECALL is read for datums, sensors and features only; give D\(\)"),
+        ("RECALL", 3, "OLP516", "RECALL is read for datums, sensors and features only"),
+        ("RECALL/ALIGN,'P'", 3, "OLP516", "RECALL is read for datums, sensors and features only"),
+        ("RECALL/S(A)\nGOTO/1,2,3", 3, "OLP516", "RECALL brings the sensor A back"),
+        ("PAUSE", 3, "OLP512", "PAUSE stops on some controls, .*; write DMESW/PAUSE"),
         ("///", 3, "OLP512", "a slash is not a statement that olp knows in DMIS"),
         ("RECALL/D(OTHER)\nGOTO/1,2,3", 4, "OLP520", r"the datum D\(OTHER\) needs the frame OTHER"),
         ("MEAS/POINT,F(A),1\nRMEAS/POINT,F(A),1", 4, "OLP532", "MEAS is inside MEAS"),
@@ -593,7 +594,8 @@ WORDS = {
     "CLMPSN FIXTID FIXTSN PREVOP PROCID ROTDEF CRGDEF ERROR BADTST ALGOR LOTNUM KEYCHAR QUERY VALUE "
     "LIGHTOPTION "
     "SIMREQT UNCERTSET UNCERTALG ENDXTN DECL PSTHRU ASSIGN OBTAIN PROMPT",
-    Support.REFUSED: "SCAN JUMPTO SELECT CASE ENDCAS DFTCAS ENDSEL XTERN INCLUD LOCATE ITERAT BFSET PTBUFF "
+    Support.REFUSED: "PAUSE "
+    "SCAN JUMPTO SELECT CASE ENDCAS DFTCAS ENDSEL XTERN INCLUD LOCATE ITERAT BFSET PTBUFF "
     "GOTARG ENDGO "
     "RESUME ROTSET ROTAB CRSLCT CRMODE THLCHG",
 }  # fmt: skip

@@ -435,8 +435,30 @@ def test_what_grbl_answers_moves_nothing(line: str, setups: dict[str, Setup]) ->
     source = Source("", f"#1=1\n{text}".encode)
     unrolled = as_asked(Sources(), source, setups[GRBL], DIALECTS[GRBL], UnrollOptions(flatten=True))
     assert line.encode() in unrolled.data
-    for moves in ("$H", "$J=G91 X5 F100", "$100=80"):
-        assert f"`{moves}`" in str(outcome(text.replace(line, moves), setups[GRBL], DIALECTS[GRBL]))
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("$J=G91 X5 F100", "is a jog, which the control takes only when it is idle"),
+        (" $j=X1 F1", "is a jog"),
+        ("$H", "homes the machine; send it before the program"),
+        ("$100=80", "changes a setting of the control; send it before the program"),
+    ],
+)
+def test_what_grbl_takes_when_idle_is_no_block(line: str, why: str, setups: dict[str, Setup]) -> None:
+    text = f"G0 X1. Y2. Z3.\n{line}\nG91\nX1."
+    assert f"`{line.strip()}` {why}" in str(outcome(text, setups[GRBL], DIALECTS[GRBL]))
+    source = Source("", f"#1=1\n{text}".encode)
+    with pytest.raises(ProgramError, match=re.escape(why)) as caught:
+        as_asked(Sources(), source, setups[GRBL], DIALECTS[GRBL], UnrollOptions(flatten=True))
+    assert (caught.value.line, caught.value.code) == (3, "OLP512")
+
+
+@pytest.mark.parametrize("code", ["G12", "G13"])
+def test_a_circular_pocket_of_haas_is_refused_with_what_to_do(code: str, setups: dict[str, Setup]) -> None:
+    got = outcome(f"G0 X1. Y0. Z0.\n{code} I5. Z-1. F100. D1", setups[HAAS], DIALECTS[HAAS])
+    assert f"{code} cuts a circular pocket inside the control; post the moves" in str(got)
 
 
 def test_a_length_without_h_is_the_one_in_force(setups: dict[str, Setup]) -> None:

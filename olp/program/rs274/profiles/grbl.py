@@ -19,6 +19,20 @@ _LACKING = {
 }
 #: What the control answers or unlocks, and the start after a hold: senders keep such lines in files.
 _ASKS = pattern(rb"[ \t]*(?:\$[$#GINX]?|[?~])[ \t]*(?:;[^\r\n]*|\([^)\r\n]*\)[ \t]*)?")
+#: System commands that are no blocks. The firmware refuses them unless it is idle, a jog also behind a jog
+#: (system.c: error 8).
+_OUTSIDE = {
+    "$J=": (
+        pattern(rb"(?i)[ \t]*\$J"),
+        "is a jog, which the control takes only when it is idle, so whether it moves is not known; "
+        "write the move as G0 or G1",
+    ),
+    "$H": (pattern(rb"(?i)[ \t]*\$H"), "homes the machine; send it before the program"),
+    "$100= and other settings": (
+        pattern(rb"[ \t]*\$\d+[ \t]*="),
+        "changes a setting of the control; send it before the program",
+    ),
+}
 
 DIALECT = Profile(
     name="grbl",
@@ -36,7 +50,7 @@ DIALECT = Profile(
     initial_retract=990,
     g10_active=True,
     machine_moves_absolute=True,
-    text=BlockText(odd_bytes=None, cr_ends_line=True, open_comments=True),
+    text=BlockText(odd_bytes=None, cr_ends_line=True, open_comments=True, outside=_OUTSIDE),
     cycles=replace(NGC_CYCLES, exact_corners=False),
     inert=_ASKS,
     language=PLAIN_NGC,

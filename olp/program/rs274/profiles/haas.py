@@ -11,8 +11,11 @@ from olp.program.rs274.profiles.base import NO_CODE, Act, g_codes
 from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
 
 _OFFSETS = dict.fromkeys((1540, *range(1100, 1300, 10)), Act.EVENT)
-#: G77 bores from below, and with G87 an operator leaves the bore; G70 to G72 make patterns of holes.
-_INSIDE = {470: "engraves text", 1500: "cuts a pocket"}
+#: G77 bores from below, and with G87 an operator leaves the bore; G70 to G72 make patterns of holes. Where
+#: G12 and G13 enter and leave the circle, and how they step out from I to K by Q, manuals show in a picture.
+_INSIDE = {
+    120: "cuts a circular pocket", 130: "cuts a circular pocket", 470: "engraves text", 1500: "cuts a pocket"
+}  # fmt: skip
 #: G101 and G100 switch mirror images on and off.
 _MIRROR = {MIRROR: Act.EVENT, 501: Act.EVENT}
 _CYCLES = {770: Act.MOTION, **dict.fromkeys((700, 710, 720, 870, *_INSIDE), Act.REFUSE)}

@@ -98,6 +98,8 @@ def _lines(profile: Control) -> Iterator[Row]:
     yield Row("% and O with a number", Support.UNCHANGED)
     if profile.inert is not None:
         yield Row("names of programs, labels, prints and questions alone in a line", Support.UNCHANGED)
+    for name, (_, why) in profile.text.outside.items():
+        yield Row(name, Support.REFUSED, why)
     tasks = profile.language.user_tasks
     flow = "= [ ] IF GOTO CALL RTS" if tasks else "# [ ] IF WHILE GOTO O-words"
     yield Row(flow, Support.REFUSED, f"parameters and flow; {UNROLL}")

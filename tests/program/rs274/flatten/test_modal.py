@@ -15,8 +15,8 @@ def unrolled(body: str, macro: str = MACRO) -> str:
 
 
 def test_each_block_that_moves_calls_the_macro() -> None:
-    body = "G66 P2 Z-3. F20.\nX1.\nM8\nG91 Y1.\nG90\nG4 P1\nG67\nX5.\n"
-    assert unrolled(body) == f"X1.\n{PASS}M8\nG91 Y1.\n{PASS}G90\nG4 P1\nX5.\n"
+    body = "G66 P2 Z-3. F20.\nX1.\nM8\nF30.\nG91 Y1.\nG90\nG4 P1\nG67\nX5.\n"
+    assert unrolled(body) == f"X1.\n{PASS}M8\nF30.\nG91 Y1.\n{PASS}G90\nG4 P1\nX5.\n"
 
 
 def test_a_count_calls_it_so_often_and_its_own_moves_call_nothing() -> None:
