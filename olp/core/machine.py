@@ -165,7 +165,9 @@ class Machine:
     None where it is not stated. `located` says whether positions in machine coordinates are known; where they
     are not, only distances are. `assumed`: nothing names the controller. `arm`: it is an arm, whose programs
     may state its joints. `track` is the way in mm by which one unit of the first external axis carries it,
-    None where it stands still. `third_level` is whether they count the third of them from the horizontal,
+    None where it stands still. `external` are other external axes by their numbers, with the value at which
+    one stays, None where it moves neither arm nor workpiece.
+    `third_level` is whether they count the third of them from the horizontal,
     None where that is not stated.
     """
 
@@ -205,6 +207,7 @@ class Machine:
     arm: bool = False
     third_level: bool | None = None
     track: Vector | None = None
+    external: Mapping[int, float | None] = field(default_factory=dict)
     pulses_per_deg: tuple[float, ...] | None = None
 
     @property

@@ -164,6 +164,14 @@ def test_base_axes_carry_the_arm_along_its_track(machine: Path) -> None:
     robot = inform.moves(olp.correct_joints(text("ROBOT", pose(JOINTS), "800.000"), machine).data)[0]
     assert np.abs(base.numbers - still.numbers - [0, 800, 0, 0, 0, 0]).max() < 2e-3
     assert np.abs(robot.numbers - still.numbers).max() < ZERO_ROUNDING
+    # without its own value the arm may be anywhere on its track, which positions of the robot do not need
+    from_arm, from_base = (
+        text(kind, pose(JOINTS), "0.000").replace(b" BC00000 ", b" ") for kind in ("ROBOT", "BASE")
+    )
+    robot = inform.moves(olp.correct_joints(from_arm, machine).data)[0]
+    assert np.abs(robot.numbers - still.numbers).max() < ZERO_ROUNDING
+    with pytest.raises(ProgramError, match="does not state its first external axis"):
+        olp.correct_joints(from_base, machine)
     with pytest.raises(ProgramError, match="counts from the user frame"):
         olp.correct_joints(text("USER", pose(JOINTS), "800.000"), machine)
     in_pulses = text("BASE", pose(JOINTS), "0.000").replace(

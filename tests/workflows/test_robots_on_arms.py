@@ -15,7 +15,7 @@ from judge.robot_moves import PULSES_PER_DEG, READERS, Frames, abc
 from scipy.spatial.transform import Rotation
 
 import olp
-from olp.core.errors import ProgramError
+from olp.core.errors import ConfigError, ProgramError
 
 #: The tool at the flange, and the frame.
 LEVER, TOOL_DEG = np.array([10.0, -5.0, 160.0]), (0.0, 10.0, 0.0)
@@ -614,7 +614,7 @@ def test_an_arm_on_a_track_keeps_its_carriage(tmp_path: Path) -> None:
         return krl_of(*moves)
 
     machine = arm_files(tmp_path)
-    with pytest.raises(ProgramError, match="state track"):
+    with pytest.raises(ProgramError, match=r"in \[kinematics\] state track"):
         olp.correct_joints(text([1500.0, 1500.0]), machine)
     plain = olp.correct_joints(text([0.0, 0.0]), machine).data
     machine.write_text(machine.read_text("utf-8") + "[kinematics]\ntrack = [1.0, 0.0, 0.0]\n", "utf-8")
@@ -626,8 +626,84 @@ def test_an_arm_on_a_track_keeps_its_carriage(tmp_path: Path) -> None:
         assert np.abs(one.turn - other.turn).max() < 1e-7
     assert result.data.count(b"E1 1500.0") == len(moved) > 3
     assert olp.correct_joints(text([1500.0, 1400.0]), machine).data.count(b"LIN") == 1
-    with pytest.raises(ProgramError, match="external axis"):
+    with pytest.raises(ProgramError, match="external axis 2 is at 3"):
         olp.correct_joints(text([0.0, 0.0], ",E2 3.0"), machine)
+    # where the carriage is has to be stated: KRL keeps an axis that a target leaves out
+    unstated = text([1500.0, 1500.0])
+    at = unstated.rindex(b",E1 1500.0")
+    with pytest.raises(ProgramError, match="does not state its first external axis") as caught:
+        olp.correct_joints(unstated[:at] + unstated[at + len(b",E1 1500.0") :], machine)
+    assert caught.value.line == unstated[:at].count(b"\n") + 1
+
+
+def _with_external(folder: Path, line: str) -> Path:
+    folder.mkdir(exist_ok=True)
+    machine = arm_files(folder)
+    machine.write_text(machine.read_text("utf-8") + f"[kinematics]\n{line}\n", "utf-8")
+    return machine
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("language", ["krl", "rapid", "tp"])
+def test_external_axes_that_are_declared_keep_their_words(language: str, tmp_path: Path) -> None:
+    """A gripper's servo goes where it wants, and a positioner stays where the work frames hold: the poses are
+    those of a program without them. Any other value is refused with its line and what to state."""
+    far = JOINTS + np.array([25, 5, -5, 5, -4, 6])
+    steps: list[Step] = [("P", JOINTS), ("L", far)]
+    old, new = {
+        "krl": (b"E1 0.0", "E1 {},E3 {}"),
+        "rapid": (b"[9E9,9E9,9E9,9E9,9E9,9E9]", "[{},9E9,{},9E9,9E9,9E9]"),
+        "tp": (b" deg\n};", " deg,\n\tE1= {} mm,\tE3= {} deg\n}};"),
+    }[language]  # fmt: skip
+    plain, more = WRITERS[language](steps), TP_FILES.replace("[kinematics]\n", "") if language == "tp" else ""
+
+    def text(*values: tuple[float, float]) -> bytes:
+        pieces = plain.split(old)
+        stated = [new.format(*pair).encode() for pair in values]
+        return b"".join(piece + words for piece, words in zip(pieces, [*stated, b""], strict=True))
+
+    declared = _with_external(tmp_path / "declared", f'external = {{ 1 = "apart", 3 = 90.5 }}\n{more}')
+    silent = _with_external(tmp_path / "silent", more)
+    still = text((12.5, 90.5), (12.5, 90.5))
+    result = olp.correct_joints(still, declared)
+    reference = READERS[language](olp.correct_joints(plain, silent).data, FRAMES)
+    moved = READERS[language](result.data, FRAMES)
+    assert len(moved) == len(reference) > 3
+    for one, other in zip(moved, reference, strict=True):
+        assert np.abs(one.tip - other.tip).max() < 1e-9
+        assert np.abs(one.turn - other.turn).max() < 1e-12
+    assert result.data.count(b"90.5") == len(moved)
+    assert any("external axis 1 is kept" in str(remark) for remark in result.report["findings"])
+    # while the servo goes, parts of a move would have to share its way
+    going = olp.correct_joints(text((12.5, 90.5), (20.25, 90.5)), declared)
+    assert len(READERS[language](going.data, FRAMES)) == len(steps)
+    for machine, says in ((declared, r"3 is at 45\.5.*stays at 90\.5"), (silent, r"3 = 45\.5 \}")):
+        with pytest.raises(ProgramError, match=says) as caught:
+            olp.correct_joints(text((0.0, 90.5 if machine is declared else 0.0), (0.0, 45.5)), machine)
+        assert (caught.value.code, caught.value.line is not None) == ("OLP563", True)
+
+
+@pytest.mark.slow
+def test_shifts_of_external_axes_are_refused_where_poses_count_from_them(tmp_path: Path) -> None:
+    text = rapid([("P", JOINTS), ("L", JOINTS + 1.0)]).replace(b"  MoveL", b"  EOffsOn DATA;\n  MoveL")
+    for line in ("", 'external = { 1 = "apart" }'):
+        assert olp.correct_joints(text, _with_external(tmp_path, line)).report["verdict"]["ok"]
+    for line in ("track = [1.0, 0.0, 0.0]", "external = { 2 = 90.0 }"):
+        with pytest.raises(ProgramError, match="EOFFSON moves a track, or a positioner"):
+            olp.correct_joints(text, _with_external(tmp_path, line))
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("external = { 7 = 1.0 }", "names an axis '7'; expected 1 to 6"),
+        ('external = { 2 = "gripper" }', "external"),
+        ('track = [1.0, 0.0, 0.0]\nexternal = { 1 = "apart" }', "carries the arm by track"),
+    ],
+)
+def test_external_axes_are_numbered_and_said_once(line: str, says: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=says):
+        olp.load_kinematics(_with_external(tmp_path, line))
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ from olp.kinematics.structure import Structure
 from olp.program.program import Program
 from olp.program.robots.dialect import RobotDialect
 from olp.program.robots.poses import Pose, matrices, matrix
-from olp.program.robots.targets import ABSENT, Target, Use
+from olp.program.robots.targets import Target, Use
 
 #: Decimals that stand for the axis values, which no text has.
 _DECIMALS = 6
@@ -212,7 +212,7 @@ class Used:
         return _flange(tips, np.array(levers).reshape(-1, 3))
 
     def refuse_unread(self, touched: Mask, frames: list[str]) -> None:
-        """Raises ProgramError for tools and frames that do not say where the flange is, and external axes.
+        """Raises ProgramError for tools and frames that do not say where the flange is.
         `touched` (n,) are targets in `frames` that were set by touching."""
         for k, use in enumerate(self.uses):
             line, target = int(self.line[k]), self.targets[use.target]
@@ -229,14 +229,6 @@ class Used:
                     f'{frames[k]} was set by touching, which is not read on arms; expected set_by = "true"',
                     line=line,
                     code="OLP523",
-                )
-            outer = target.outer[1:] if use.carried else target.outer
-            if any(value != 0.0 and abs(value) < ABSENT for value in outer):
-                raise ProgramError(
-                    "an external axis is not at zero, and the machine file does not say what it carries; "
-                    "where the first one carries the arm, state track in [kinematics]",
-                    line=line,
-                    code="OLP563",
                 )
 
 

@@ -145,6 +145,10 @@ def _arm(file: JointMachineFile, structure: Structure, path: PathLike) -> Machin
         arm=True,
         third_level=file.kinematics.third_joint_level,
         track=file.kinematics.track,
+        external={
+            int(number): None if isinstance(value, str) else value
+            for number, value in file.kinematics.external.items()
+        },
         pulses_per_deg=pulses or None,
     )
 

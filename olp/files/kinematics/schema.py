@@ -16,6 +16,9 @@ LINEAR_NAMES = "XYZUVW"
 ROTARY_NAMES = "ABC"
 #: Keys whose unit is not that of the axis.
 _OF_ANY_UNIT = ("point_mm", "pulses_per_deg")
+#: External axes of robot programs, and the one that a track is.
+EXTERNAL_NUMBERS = "123456"
+TRACK_NUMBER = "1"
 #: Axes whose directions are known by name.
 OWN_DIRECTIONS = "XYZ"
 
@@ -127,6 +130,13 @@ class KinematicsTable(Table):
         description="the direction in which the first external axis of robot programs (E1, eax_a) carries "
         "the arm, in mm, [X, Y, Z] in machine coordinates; the errors are those of the arm on its carriage",
     )
+    external: dict[Text, float | Literal["apart"]] = Field(
+        default={},
+        description="the other external axes of robot programs by their numbers, 1 (E1, eax_a) to 6. "
+        '"apart" moves neither the arm nor the workpiece, such as the servo of a gripper. A number is the '
+        "value, in the unit of the program, at which the axis stays and the work frames hold, such as that "
+        "of a positioner. An axis that is not named has to be at zero",
+    )
     third_joint_level: bool | None = Field(
         default=None,
         description="whether robot programs count the third joint from the horizontal, as FANUC controls do, "
@@ -161,6 +171,16 @@ class KinematicsTable(Table):
         "direction. Of two positions for CYCLE800, _DIR 1 takes the one with the larger value of this axis, "
         "-1 the smaller. If left out, a plane with two positions is refused",
     )
+
+    @rule("external")
+    @staticmethod
+    def _numbered(value: dict[str, float | str], known: Known) -> dict[str, float | str]:
+        for number in value:
+            if number not in tuple(EXTERNAL_NUMBERS):
+                raise refusal(f"names an axis {number!r}; expected 1 to 6, such as {{ 2 = 90.0 }}")
+            if number == TRACK_NUMBER and known.get("track") is not None:
+                raise refusal("names axis 1, which carries the arm by track; expected one of both")
+        return value
 
 
 def none_named(value: list[str]) -> list[str]:

@@ -18,10 +18,10 @@ from olp.core.toolpath import Flag, Frame, Kind
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.robots.arcs import Chords
+from olp.program.robots.external import External, differ
 from olp.program.robots.frames import Located, RobotFrames, Tool
 from olp.program.robots.poses import NO_TURN, Pose, Quaternion, angle_between
 from olp.program.robots.targets import (
-    ABSENT,
     NO_COPY,
     NOWHERE,
     Arc,
@@ -91,16 +91,14 @@ class RobotMoves:
         self._left: list[DecidedInRun] = []
         self._held: set[str] = set()
         self._remarks: dict[str, tuple[str, int, str]] = {}
+        self.external = External(setup.machine, self.remark)
         self.known = True
         self._frame = -1
         self._turn: Quaternion | None = None
         self._rest: tuple[float, ...] = ()
         self._feed = NAN
-        #: where the carriage of an arm is, and frames that count from there
-        self._away: float | None = None
         #: the frame and the tool of the last move, and how it uses its target
         self._at: tuple[Located, Tool, Use] | None = None
-        self._on_track: dict[tuple[str, float], Pose] = {}
         self._first_turns: dict[str, Quaternion] = {}
         #: numbers of frames, with what they are the numbers of: two tools may have the same name
         self._index: dict[tuple[int, int, Quaternion, Vector], tuple[int, Located, Tool]] = {}
@@ -174,12 +172,10 @@ class RobotMoves:
             what = f"the orientation changes, and the vector of the tool {tool.name} does not"
             self.remark("turning", line, what, "turning")
         before = use.turn if self._turn is None else self._turn
-        pose, away = self._carried(frame, target)
-        whole |= chord or away != self._away
-        self._away = away
-        self.uses.append(
-            use.begun(before, pose, tool.pose, straight=known, whole=whole, carried=away is not None)
-        )
+        self.external.refuse_unknown(target, line)
+        pose = self.external.frame(frame, target, line)
+        whole |= self.external.moves(target) or chord
+        self.uses.append(use.begun(before, pose, tool.pose, straight=known, whole=whole))
         self.known, self._frame, self._turn, self._rest, self._feed = True, index, use.turn, target.rest, feed
         self._at = frame, tool, use
 
@@ -194,8 +190,8 @@ class RobotMoves:
         if begin is None or begin[:2] != (frame, tool):
             self._at_points(line, (via, end), frame, tool, feed, "where this arc begins is not stated")
             return
-        outer = self.targets[begin[2].target].outer
-        if any(self.targets[use.target].outer != outer for use in (via, end)):
+        start, middle, last = (self.targets[use.target] for use in (begin[2], via, end))
+        if differ(start, middle) or differ(middle, last):
             self._at_points(line, (via, end), frame, tool, feed, "an external axis moves along this arc")
             return
         places = [np.array(place) for place in map(self._place, (begin[2], via, end))]
@@ -292,27 +288,12 @@ class RobotMoves:
             line=line, frame=self._frame, end=_NOWHERE, slot=(-1, -1, -1), bounds=NOWHERE,
             feed=feed if known else self._feed,
         )  # fmt: skip
-        away = self._carried(self.frames.world, self.targets[use.target])[1]
-        whole |= away != self._away
-        self._away = away
+        target = self.targets[use.target]
+        self.external.refuse_unknown(target, line)
+        whole |= self.external.moves(target)
         pose = Pose() if tool is None else tool.pose
-        self.uses.append(replace(use, tool=pose, straight=known, whole=whole, carried=away is not None))
+        self.uses.append(replace(use, tool=pose, straight=known, whole=whole))
         self.known, self._turn, self._rest, self._at = True, NO_TURN, (), None
-
-    def _carried(self, frame: Located, target: Target) -> tuple[Pose, float | None]:
-        """A frame as it counts from the carriage of an arm on a track, and where that is; None where it
-        stands still."""
-        track = self.setup.machine.track
-        if track is None or not target.outer or abs(target.outer[0]) >= ABSENT:
-            return frame.pose, None
-        along = target.outer[0]
-        what = "the arm is carried along its track: errors of the track itself are not corrected"
-        self.remark("track", target.line, what)
-        key = frame.name, along
-        if key not in self._on_track:
-            x, y, z = (a - along * b for a, b in zip(frame.pose.origin_mm, track, strict=True))
-            self._on_track[key] = Pose((x, y, z), frame.pose.turn)
-        return self._on_track[key], along
 
     def away(self, line: int) -> None:
         """The machine may have gone to a position that the text does not state."""

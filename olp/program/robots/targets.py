@@ -71,8 +71,8 @@ class Use:
     which are those of the tool where it is `along_tool`. `frame` is the pose of the target's frame in machine
     coordinates, and `tool` that of the tip at the flange, None where the program does not state it. The
     robot goes `straight` from a known target, or with any posture that is near where it is `free`. A move
-    that is `whole` is never split. Where the first external axis has `carried` the arm along its track,
-    `frame` counts from its carriage."""
+    that is `whole` is never split. Where a track carries the arm, `frame` counts from its
+    carriage."""
 
     target: int
     statement: Span
@@ -90,17 +90,14 @@ class Use:
     straight: bool = False
     free: bool = False
     whole: bool = False
-    carried: bool = False
 
     def begun(
-        self, before: Quaternion, frame: Pose, tool: Pose | None, *, straight: bool, whole: bool,
-        carried: bool,
-    ) -> Use:  # fmt: skip
+        self, before: Quaternion, frame: Pose, tool: Pose | None, *, straight: bool, whole: bool
+    ) -> Use:
         """The same with where it begins, in its frame and with its tool."""
         return Use(
             self.target, self.statement, self.place, self.named, self.shift_mm, self.turn, before, self.zone,
             self.offsets, self.offset_turn, self.along_tool, frame, tool, straight, self.free, whole,
-            carried,
         )  # fmt: skip
 
 

@@ -206,6 +206,9 @@ class Places:
                     line,
                 )
             bases += values
+        if not bases and position.header.kind.upper() == b"ROBOT" and self.setup.machine.track is not None:
+            # it counts from the arm, wherever its carriage is
+            bases = [0.0]
         if not bases and not own:
             return ()
         return (*(bases or (ABSENT,)), *own)

@@ -22,7 +22,7 @@ from olp.program.robots.krl.turning import Turning
 from olp.program.robots.line import Line
 from olp.program.robots.moves import NAN, DecidedInRun, RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose, multiplied, rotated
-from olp.program.robots.targets import NOWHERE, Span, Use
+from olp.program.robots.targets import ABSENT, NOWHERE, Span, Use
 
 _MOVE = pattern(rb"(?i)(S?(?:LIN|PTP|CIRC))\s*(?=[\s{])(.*)")
 _DISTANCE = pattern(rb"(?i)(S?(?:LIN|PTP|CIRC)_REL)\b")
@@ -312,7 +312,7 @@ class _Reader:
             a, b, c, d, e, f = (value for _, value in values)
             self.targets[numbers.span] = self.moves.joint_target(
                 declaration.line, numbers.span, [own for own, _ in values], (a, b, c, d, e, f),
-                _outer(numbers), "" if name is None else name[1].decode("latin-1"),
+                _outer(numbers, ABSENT), "" if name is None else name[1].decode("latin-1"),
                 NOWHERE if name is None else (declaration.begin, declaration.end),
             )  # fmt: skip
         named = NOWHERE if name is None else span
@@ -393,13 +393,13 @@ class _Reader:
             what = "the position" if name is None else f"the position {key_of(name[1], name[2])}"
             pose, values = pose_of(numbers, line.line, what), numbers.values
             x, y, z, a, b, c = (values[axis][0] for axis in _POSE)
-            outer = _outer(numbers)
             self.targets[numbers.span] = self.moves.target(
-                declaration.line, numbers.span, (x, y, z), pose.origin_mm, pose.turn, outer,
+                declaration.line, numbers.span, (x, y, z), pose.origin_mm, pose.turn, _outer(numbers, 0.0),
                 "" if name is None else name[1].decode("latin-1"),
                 NOWHERE if name is None else (declaration.begin, declaration.end), (a, b, c),
                 (values["T"][0],) if "T" in values else (),
-                tuple(values[word][1] if word in values else NAN for word in "ST"), outer,
+                tuple(values[word][1] if word in values else NAN for word in "ST"),
+                _outer(numbers, ABSENT),
             )  # fmt: skip
         return self.targets[numbers.span], NOWHERE if name is None else span
 
@@ -412,6 +412,6 @@ class _Reader:
         )
 
 
-def _outer(numbers: Aggregate) -> tuple[float, ...]:
-    """The values of the external axes."""
-    return tuple(numbers.values[axis][1] if axis in numbers.values else 0.0 for axis in _OUTER)
+def _outer(numbers: Aggregate, absent: float) -> tuple[float, ...]:
+    """The values of the external axes; `absent` is that of one which is not stated, and stays."""
+    return tuple(numbers.values[axis][1] if axis in numbers.values else absent for axis in _OUTER)

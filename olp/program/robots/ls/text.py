@@ -5,7 +5,7 @@ from __future__ import annotations
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
-from olp.program.robots.targets import Span
+from olp.program.robots.targets import ABSENT, Span
 from olp.program.text.numbers import LARGEST
 
 _PART = pattern(rb"(?im)^[ \t]*/(PROG|ATTR|APPL|MN|POS|END)\b[^\r\n]*")
@@ -53,9 +53,9 @@ class Position:
 
     @property
     def outer(self) -> tuple[float, ...]:
-        """The values of the external axes."""
-        names = sorted(name for name in self.axes if name[0] == "E")
-        return tuple(self.axes[name][1] for name in names)
+        """The values of the external axes from the first to the last that is stated."""
+        stated = {int(name[1:]): value for name, (_, value) in self.axes.items() if name[0] == "E"}
+        return tuple(stated.get(number, ABSENT) for number in range(1, max(stated, default=0) + 1))
 
 
 def parts(data: bytes) -> dict[str, list[Span]]:

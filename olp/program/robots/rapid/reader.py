@@ -40,7 +40,7 @@ _LEFT = {
 #: What ends a routine, or a record, behind END.
 _ROUTINES = frozenset((b"PROC", b"FUNC", b"TRAP", b"RECORD"))
 _NOT_READ = "OLP512"
-#: What moves the values of external axes alone, which carry the robot where it is on a track.
+#: What moves the values of external axes alone, from which poses count where they are declared so.
 _OUTER = (b"EOFFSON", b"EOFFSSET")
 
 
@@ -139,7 +139,7 @@ class _Reader:
         row = TABLE.get(word)
         if row is None:
             self._call(statement, word)
-        elif word in _OUTER and self.moves.setup.machine.track is None:
+        elif word in _OUTER and not self.moves.external.counts:
             return
         elif row[0] is Support.REFUSED:
             raise ProgramError(f"{word.decode('latin-1')} {row[1]}", line=statement.line, code=_NOT_READ)

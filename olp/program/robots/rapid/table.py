@@ -46,7 +46,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     **dict.fromkeys((b"SEARCHJ", b"CONTACTL"), (_NO, _COMPUTED)),
     b"TRIGGABSJ": (_NO, "is a move with an action on the way, which is not read yet"),
     **dict.fromkeys((b"PDISPON", b"PDISPSET"), (_NO, _MOVED)),
-    **dict.fromkeys((b"EOFFSON", b"EOFFSSET"), (_NO, "moves an arm along its track; elsewhere it is kept")),
+    **dict.fromkeys((b"EOFFSON", b"EOFFSSET"), (_NO, "moves a track, or a positioner; elsewhere it is kept")),
     **dict.fromkeys(
         (b"CORRCON", b"CORRWRITE", b"EGMACTPOSE", b"EGMACTJOINT", b"EGMACTMOVE", b"EGMRUNPOSE",
          b"EGMRUNJOINT", b"EGMMOVEL", b"EGMMOVEC", b"EGMSTREAMSTART", b"CONTACTL"),

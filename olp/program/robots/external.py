@@ -1,0 +1,101 @@
+"""External axes of robot programs: a track that carries the arm, those that move nothing of concern, and
+those that stay at one value."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from olp.core.errors import ProgramError
+from olp.core.machine import Machine
+from olp.program.robots.frames import Located
+from olp.program.robots.poses import Pose
+from olp.program.robots.targets import ABSENT, Target
+
+_CODE = "OLP563"
+
+
+class External:
+    """What the machine file says of external axes, and where those are that may move. `remark` notes the
+    first of what is about the same, by its line and text. Where the machine is no arm, nothing counts from
+    them."""
+
+    def __init__(self, machine: Machine, remark: Callable[[str, int, str], None]) -> None:
+        self._arm, self._track, self._declared = machine.arm, machine.track, machine.external
+        self._remark = remark
+        self._at: dict[int, float] = {}
+        self._frames: dict[tuple[str, float], Pose] = {}
+
+    @property
+    def counts(self) -> bool:
+        """Whether a pose hangs on the value of one of them."""
+        return self._track is not None or any(value is not None for value in self._declared.values())
+
+    def _carries(self, number: int) -> bool:
+        return number == 1 and self._track is not None
+
+    def refuse_unknown(self, target: Target, line: int) -> None:
+        """Raises ProgramError where an axis is at a value at which it is not stated what it carries."""
+        if not self._arm:
+            return
+        for number, value in enumerate(target.outer, 1):
+            if abs(value) >= ABSENT or self._carries(number):
+                continue
+            stays = self._declared.get(number, 0.0)
+            if stays is None:
+                what = f"the external axis {number} is kept: it moves neither the arm nor the workpiece"
+                self._remark(f"external {number}", line, f"{what}, as the machine file says")
+            elif value != stays:
+                raise ProgramError(_unknown(number, value, self._declared), line=line, code=_CODE)
+
+    def moves(self, target: Target) -> bool:
+        """Whether an axis moves on the way to a target, or may move. One that the target does not state
+        stays."""
+        moved = False
+        for number, value in enumerate(target.outer, 1):
+            free = self._carries(number) or self._declared.get(number, 0.0) is None
+            if free and abs(value) < ABSENT and self._at.get(number) != value:
+                self._at[number], moved = value, True
+        return moved
+
+    def frame(self, frame: Located, target: Target, line: int) -> Pose:
+        """A frame of a pose as it counts from the carriage of an arm on a track. Raises ProgramError where
+        the target does not state where that is."""
+        if self._track is None:
+            return frame.pose
+        along = target.outer[0] if target.outer else ABSENT
+        if abs(along) >= ABSENT:
+            raise ProgramError(
+                "the arm is on a track, and this target does not state its first external axis, so where the "
+                "carriage is is not known; state it in the target, or leave out track in [kinematics] and "
+                "count the work frames from the arm",
+                line=line,
+                code=_CODE,
+            )
+        what = "the arm is carried along its track: errors of the track itself are not corrected"
+        self._remark("track", target.line, what)
+        key = frame.name, along
+        if key not in self._frames:
+            x, y, z = (a - along * b for a, b in zip(frame.pose.origin_mm, self._track, strict=True))
+            self._frames[key] = Pose((x, y, z), frame.pose.turn)
+        return self._frames[key]
+
+
+def differ(before: Target, after: Target) -> bool:
+    """Whether an external axis moves from one target to another; one that is not stated stays."""
+    begun = before.outer + (ABSENT,) * len(after.outer)
+    return any(abs(b) < ABSENT and a != b for a, b in zip(begun, after.outer, strict=False))
+
+
+def _unknown(number: int, value: float, declared: Mapping[int, float | None]) -> str:
+    if number in declared:
+        return (
+            f"the external axis {number} is at {value}, and external in [kinematics] says that it stays at "
+            f"{declared[number]}, where the work frames hold; correct the moves at {value} as a program of "
+            "their own, with the work frames and the machine file of that position"
+        )
+    track = "track = [X, Y, Z] where it carries the arm, " if number == 1 else ""
+    return (
+        f"the external axis {number} is at {value}, and the machine file does not say what it carries; in "
+        f'[kinematics] state {track}external = {{ {number} = "apart" }} where it moves neither the arm nor '
+        f"the workpiece, or external = {{ {number} = {value} }} where it stays there and the work frames hold"
+    )
