@@ -614,7 +614,7 @@ def test_an_arm_on_a_track_keeps_its_carriage(tmp_path: Path) -> None:
         return krl_of(*moves)
 
     machine = arm_files(tmp_path)
-    with pytest.raises(ProgramError, match=r"in \[kinematics\] state track"):
+    with pytest.raises(ProgramError, match=r"In \[kinematics\] state track"):
         olp.correct_joints(text([1500.0, 1500.0]), machine)
     plain = olp.correct_joints(text([0.0, 0.0]), machine).data
     machine.write_text(machine.read_text("utf-8") + "[kinematics]\ntrack = [1.0, 0.0, 0.0]\n", "utf-8")

@@ -66,7 +66,7 @@ class External:
         if abs(along) >= ABSENT:
             raise ProgramError(
                 "the arm is on a track, and this target does not state its first external axis, so where the "
-                "carriage is is not known; state it in the target, or leave out track in [kinematics] and "
+                "carriage is is not known. State it in the target, or leave out track in [kinematics] and "
                 "count the work frames from the arm",
                 line=line,
                 code=_CODE,
@@ -90,12 +90,12 @@ def _unknown(number: int, value: float, declared: Mapping[int, float | None]) ->
     if number in declared:
         return (
             f"the external axis {number} is at {value}, and external in [kinematics] says that it stays at "
-            f"{declared[number]}, where the work frames hold; correct the moves at {value} as a program of "
+            f"{declared[number]}, where the work frames hold. Correct the moves at {value} as a program of "
             "their own, with the work frames and the machine file of that position"
         )
     track = "track = [X, Y, Z] where it carries the arm, " if number == 1 else ""
     return (
-        f"the external axis {number} is at {value}, and the machine file does not say what it carries; in "
+        f"the external axis {number} is at {value}, and the machine file does not say what it carries. In "
         f'[kinematics] state {track}external = {{ {number} = "apart" }} where it moves neither the arm nor '
-        f"the workpiece, or external = {{ {number} = {value} }} where it stays there and the work frames hold"
+        f"the workpiece. State external = {{ {number} = {value} }} where it stays there, as the frames do"
     )
