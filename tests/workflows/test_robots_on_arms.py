@@ -680,7 +680,7 @@ def test_external_axes_that_are_declared_keep_their_words(language: str, tmp_pat
     for machine, says in ((declared, r"3 is at 45\.5.*stays at 90\.5"), (silent, r"3 = 45\.5 \}")):
         with pytest.raises(ProgramError, match=says) as caught:
             olp.correct_joints(text((0.0, 90.5 if machine is declared else 0.0), (0.0, 45.5)), machine)
-        assert (caught.value.code, caught.value.line is not None) == ("OLP563", True)
+        assert (caught.value.code, caught.value.line is not None) == ("OLP564", True)
 
 
 @pytest.mark.slow

@@ -337,7 +337,7 @@ RULES = (
         "a rotary axis where nothing "
         "moves.",
         remedy="State the axis in the machine file. Give offsets of rotary axes in [work_offsets.NAME].",
-        example="`G1 B10` on a machine with A and C, and `G92 A0`.",
+        example="`G1 B10` on a machine with A and C, `G92 A0`, and `E1` of a robot that is not at zero.",
     ),
     _rule(
         "OLP565",

@@ -11,7 +11,7 @@ from olp.program.robots.frames import Located
 from olp.program.robots.poses import Pose
 from olp.program.robots.targets import ABSENT, Target
 
-_CODE = "OLP563"
+_CODE = "OLP564"
 
 
 class External:
