@@ -12,18 +12,17 @@ Case = TypeVar("Case")
 
 def some_fast(cases: Iterable[Any], each: int) -> list[Any]:
     """The cases, all but one in `each` marked as slow; a tuple is the values of several names."""
-    values = [case if isinstance(case, tuple) else (case,) for case in cases]
-    return [
-        pytest.param(*value, marks=pytest.mark.slow if k % each else ()) for k, value in enumerate(values)
-    ]
+    return _others_marked(cases, each, pytest.mark.slow)
 
 
 def some_of_a_campaign(cases: Iterable[Any], each: int) -> list[Any]:
     """The cases of a slow test, all but one in `each` left to a campaign before a release."""
+    return _others_marked(cases, each, pytest.mark.campaign)
+
+
+def _others_marked(cases: Iterable[Any], each: int, mark: pytest.MarkDecorator) -> list[Any]:
     values = [case if isinstance(case, tuple) else (case,) for case in cases]
-    return [
-        pytest.param(*value, marks=pytest.mark.campaign if k % each else ()) for k, value in enumerate(values)
-    ]
+    return [pytest.param(*value, marks=mark if k % each else ()) for k, value in enumerate(values)]
 
 
 def in_each(cases: Iterable[Case], name: Callable[[Case], str]) -> Callable[[Callable[[Case], None]], Any]:

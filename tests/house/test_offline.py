@@ -59,8 +59,8 @@ def watched(*words: str, act: str = "") -> tuple[list[str], set[str]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("verb", ["correct", "verify", "check", "simulate", "inspect", "view", "fit"])
 def test_no_verb_reaches_out(verb: str, tmp_path: Path) -> None:
-    machine = ("-m", "programs/table-router/machine.toml")
-    program, out = "programs/table-router/drill.ngc", str(tmp_path / "out.ngc")
+    machine = ("-m", "programs/nasty/machine.toml")
+    program, out = "programs/nasty/modal.ngc", str(tmp_path / "out.ngc")
     lines = ("programs/gantry-lines", "-m", "programs/gantry-lines/machine.toml")
     words = {
         "correct": ("correct", program, *machine, "-o", out, "--report", str(tmp_path / "r.json")),
