@@ -166,9 +166,8 @@ class Machine:
     are not, only distances are. `assumed`: nothing names the controller. `arm`: it is an arm, whose programs
     may state its joints. `track` is the way in mm by which one unit of the first external axis carries it,
     None where it stands still. `external` are other external axes by their numbers, with the value at which
-    one stays, None where it moves neither arm nor workpiece.
-    `third_level` is whether they count the third of them from the horizontal,
-    None where that is not stated.
+    one stays, None where it moves neither arm nor workpiece. `third_level` is whether programs count the
+    third joint from the horizontal, None where that is not stated.
     """
 
     name: str

@@ -11,8 +11,6 @@ from olp.program.robots.frames import Located
 from olp.program.robots.poses import Pose
 from olp.program.robots.targets import ABSENT, Target
 
-_CODE = "OLP564"
-
 
 class External:
     """What the machine file says of external axes, and where those are that may move. `remark` notes the
@@ -30,32 +28,23 @@ class External:
         """Whether a pose hangs on the value of one of them."""
         return self._track is not None or any(value is not None for value in self._declared.values())
 
-    def _carries(self, number: int) -> bool:
-        return number == 1 and self._track is not None
-
-    def refuse_unknown(self, target: Target, line: int) -> None:
-        """Raises ProgramError where an axis is at a value at which it is not stated what it carries."""
-        if not self._arm:
-            return
+    def moves(self, target: Target, line: int) -> bool:
+        """Whether an axis moves on the way to a target, or may move. One that the target does not state
+        stays. Raises ProgramError where one is at a value at which it is not stated what it carries."""
+        before = dict(self._at)
         for number, value in enumerate(target.outer, 1):
-            if abs(value) >= ABSENT or self._carries(number):
+            if not self._arm or abs(value) >= ABSENT:
                 continue
             stays = self._declared.get(number, 0.0)
-            if stays is None:
+            if number == 1 and self._track is not None:
+                self._at[number] = value
+            elif stays is None:
+                self._at[number] = value
                 what = f"the external axis {number} is kept: it moves neither the arm nor the workpiece"
                 self._remark(f"external {number}", line, f"{what}, as the machine file says")
             elif value != stays:
-                raise ProgramError(_unknown(number, value, self._declared), line=line, code=_CODE)
-
-    def moves(self, target: Target) -> bool:
-        """Whether an axis moves on the way to a target, or may move. One that the target does not state
-        stays."""
-        moved = False
-        for number, value in enumerate(target.outer, 1):
-            free = self._carries(number) or self._declared.get(number, 0.0) is None
-            if free and abs(value) < ABSENT and self._at.get(number) != value:
-                self._at[number], moved = value, True
-        return moved
+                raise ProgramError(_unknown(number, value, self._declared), line=line, code="OLP564")
+        return self._at != before
 
     def frame(self, frame: Located, target: Target, line: int) -> Pose:
         """A frame of a pose as it counts from the carriage of an arm on a track. Raises ProgramError where
@@ -69,7 +58,7 @@ class External:
                 "carriage is is not known. State it in the target, or leave out track in [kinematics] and "
                 "count the work frames from the arm",
                 line=line,
-                code=_CODE,
+                code="OLP516",
             )
         what = "the arm is carried along its track: errors of the track itself are not corrected"
         self._remark("track", target.line, what)

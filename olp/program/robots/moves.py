@@ -172,9 +172,8 @@ class RobotMoves:
             what = f"the orientation changes, and the vector of the tool {tool.name} does not"
             self.remark("turning", line, what, "turning")
         before = use.turn if self._turn is None else self._turn
-        self.external.refuse_unknown(target, line)
+        whole |= self.external.moves(target, line) or chord
         pose = self.external.frame(frame, target, line)
-        whole |= self.external.moves(target) or chord
         self.uses.append(use.begun(before, pose, tool.pose, straight=known, whole=whole))
         self.known, self._frame, self._turn, self._rest, self._feed = True, index, use.turn, target.rest, feed
         self._at = frame, tool, use
@@ -288,9 +287,7 @@ class RobotMoves:
             line=line, frame=self._frame, end=_NOWHERE, slot=(-1, -1, -1), bounds=NOWHERE,
             feed=feed if known else self._feed,
         )  # fmt: skip
-        target = self.targets[use.target]
-        self.external.refuse_unknown(target, line)
-        whole |= self.external.moves(target)
+        whole |= self.external.moves(self.targets[use.target], line)
         pose = Pose() if tool is None else tool.pose
         self.uses.append(replace(use, tool=pose, straight=known, whole=whole))
         self.known, self._turn, self._rest, self._at = True, NO_TURN, (), None

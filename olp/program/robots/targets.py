@@ -71,8 +71,7 @@ class Use:
     which are those of the tool where it is `along_tool`. `frame` is the pose of the target's frame in machine
     coordinates, and `tool` that of the tip at the flange, None where the program does not state it. The
     robot goes `straight` from a known target, or with any posture that is near where it is `free`. A move
-    that is `whole` is never split. Where a track carries the arm, `frame` counts from its
-    carriage."""
+    that is `whole` is never split. Where a track carries the arm, `frame` counts from its carriage."""
 
     target: int
     statement: Span
