@@ -444,6 +444,8 @@ def test_what_grbl_answers_moves_nothing(line: str, setups: dict[str, Setup]) ->
         (" $j=X1 F1", "is a jog"),
         ("$H", "homes the machine; send it before the program"),
         ("$100=80", "changes a setting of the control; send it before the program"),
+        ("$N0=G20", "changes a setting of the control"),
+        ("$RST=*", "changes a setting of the control"),
     ],
 )
 def test_what_grbl_takes_when_idle_is_no_block(line: str, why: str, setups: dict[str, Setup]) -> None:

@@ -29,7 +29,7 @@ _OUTSIDE = {
     ),
     "$H": (pattern(rb"(?i)[ \t]*\$H"), "homes the machine; send it before the program"),
     "$100= and other settings": (
-        pattern(rb"[ \t]*\$\d+[ \t]*="),
+        pattern(rb"(?i)[ \t]*\$(?:\d+|N\d*|RST)[ \t]*="),
         "changes a setting of the control; send it before the program",
     ),
 }
