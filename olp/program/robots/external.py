@@ -54,9 +54,9 @@ class External:
         along = target.outer[0] if target.outer else ABSENT
         if abs(along) >= ABSENT:
             raise ProgramError(
-                "the arm is on a track, and this target does not state its first external axis, so where the "
-                "carriage is is not known. State it in the target, or leave out track in [kinematics] and "
-                "count the work frames from the arm",
+                "the arm is on a track, and this target does not state its first external axis, so it is "
+                "not known where the carriage is. State it in the target, or leave out track in [kinematics] "
+                "and count the work frames from the arm",
                 line=line,
                 code="OLP516",
             )
