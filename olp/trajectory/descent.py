@@ -8,7 +8,7 @@ Source: Boyd and Vandenberghe, Convex Optimization, 11.7; Levenberg-Marquardt fo
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.linalg import LinAlgError, solveh_banded
@@ -70,14 +70,15 @@ class Group:
     """Bounds: `value` (r, k) is at most 1, and with both `sides` at least -1.
 
     `slope` (r, k, 5, axes + 1) is its change by the five nodes from `base` (r,) on, which is -1 or more.
-    `curve` (r, c, 5, axes + 1) are rows whose squares are half its curvature. Both are empty where only
-    values are asked for."""
+    Each base is one more than that before, unless they are `scattered`. `curve` (r, c, 5, axes + 1) are rows
+    whose squares are half its curvature. Both are empty where only values are asked for."""
 
     base: Index
     value: Array
     sides: bool
     slope: Array
     curve: Array | None = None
+    scattered: bool = False
 
     def slack(self) -> Array:
         """(1 or 2, r, k) what is left below 1, and above -1."""
@@ -101,19 +102,20 @@ def least_time(spline: TimeSpline, bounds: Bounds, size_mm: float) -> TimeSpline
     """The spline of least time, from one strictly within the bounds. The first three and the last three
     coefficients are kept; others move by about `size_mm`."""
     groups = bounds(spline, True)
+    slacks = [group.slack() for group in groups]
     whole = spline.duration_s
     count = sum(group.value.size * (1 + group.sides) for group in groups)
     mu = _FIRST / count
-    duals = [mu / group.slack() for group in groups]
+    duals = [mu / slack for slack in slacks]
     ridge, stuck = np.full(len(spline), _RIDGE), 0
     longest, times = 1.0, [whole]
     for _ in range(_STEPS):
         try:
-            step = _newton(spline, groups, duals, mu, whole, size_mm, ridge)
+            step = _newton(spline, groups, duals, slacks, mu, whole, size_mm, ridge)
         except LinAlgError:
             break
         changes = [group.change(step) for group in groups]
-        there, length, most = _toward(spline, groups, changes, bounds, step, longest)
+        there, length, most = _toward(spline, groups, slacks, changes, bounds, step, longest)
         longest = _LONGER * max(length, _SHORTEST)
         factor = np.where(most < _SHORT, _STIFFER, np.where(most > _LONG, _SOFTER, 1.0))
         ridge = np.clip(ridge * factor, *_RIDGES)
@@ -123,10 +125,11 @@ def least_time(spline: TimeSpline, bounds: Bounds, size_mm: float) -> TimeSpline
                 break
             continue
         spline = there
-        dual_length = _advance(groups, duals, changes, mu)
+        dual_length = _advance(duals, slacks, changes, mu)
         groups = bounds(spline, True)
-        for dual, group in zip(duals, groups, strict=True):
-            central = mu / group.slack()
+        slacks = [group.slack() for group in groups]
+        for dual, slack in zip(duals, slacks, strict=True):
+            central = mu / slack
             np.clip(dual, central / _APART, central * _APART, out=dual)
         mu *= next(fall for least, fall in _FALL if min(length, dual_length) > least)
         mu = max(mu, _LEAST / count)
@@ -137,8 +140,8 @@ def least_time(spline: TimeSpline, bounds: Bounds, size_mm: float) -> TimeSpline
 
 
 def _newton(
-    spline: TimeSpline, groups: list[Group], duals: list[Array], mu: float, whole: float, size_mm: float,
-    ridge: Array,
+    spline: TimeSpline, groups: list[Group], duals: list[Array], slacks: list[Array], mu: float, whole: float,
+    size_mm: float, ridge: Array,
 ) -> Array:  # fmt: skip
     """Newton's step of the nodes, padded by one before and two behind (m + 6, axes + 1)."""
     m, axes = len(spline), spline.coefficient.shape[1]
@@ -146,20 +149,17 @@ def _newton(
     gradient = np.zeros((m + 6, wide))
     gradient[2 : m + 2, axes] = 1.0 / whole
     blocks = np.zeros((m + 2, NODES * wide, NODES * wide))
-    for group, dual in zip(groups, duals, strict=True):
-        if not len(group.base):
-            continue
-        rows, slack = group.slope.reshape(*group.value.shape, -1), group.slack()
-        weight = (dual / slack).sum(axis=0)
+    for base, rows, weight, pull in _stacked(groups, duals, slacks, mu):
         block = rows.transpose(0, 2, 1) @ (weight[:, :, None] * rows)
-        if group.curve is not None:
-            curve = group.curve.reshape(*group.curve.shape[:2], -1)
-            block += dual[0, :, :, None] * (curve.transpose(0, 2, 1) @ curve)
-        pull = (mu * group.signs() / slack).sum(axis=0)
         pulled = (pull[:, None, :] @ rows).reshape(-1, NODES, wide)
-        _add(blocks, group.base + 1, block)
-        for k in range(NODES):
-            _add(gradient, group.base + 1 + k, pulled[:, k])
+        if isinstance(base, slice):
+            blocks[base] += block
+            for k in range(NODES):
+                gradient[base.start + k : base.stop + k] += pulled[:, k]
+        else:
+            np.add.at(blocks, base, block)
+            for k in range(NODES):
+                np.add.at(gradient, base + k, pulled[:, k])
     scale = np.full((m + 6, wide), size_mm)
     scale[2 : m + 2, axes] = spline.cell_s
     free = np.zeros((m + 6, wide), bool)
@@ -169,6 +169,42 @@ def _newton(
     stiff[2 : m + 2, axes] = ridge
     step = _solved(blocks, gradient.ravel(), scale.ravel(), free.ravel(), stiff.ravel(), wide)
     return step.reshape(m + 6, wide)
+
+
+def _stacked(
+    groups: list[Group], duals: list[Array], slacks: list[Array], mu: float
+) -> Iterator[tuple[slice | Index, Array, Array, Array]]:
+    """Of groups the padded nodes from which their rows are (r,), rows (r, k, 5 (axes + 1)), weights (r, k)
+    and how they pull (r, k). Those that are not scattered come as one: a few large products take less than
+    many small ones."""
+    in_order: list[tuple[int, Array, Array, Array]] = []
+    for group, dual, slack in zip(groups, duals, slacks, strict=True):
+        if not len(group.base):
+            continue
+        weight, pull = (dual / slack).sum(axis=0), (mu * group.signs() / slack).sum(axis=0)
+        rows = group.slope
+        if group.curve is not None:
+            curved = dual[0].repeat(group.curve.shape[1], axis=1)
+            weight = np.concatenate((weight, curved), axis=1)
+            pull = np.concatenate((pull, np.zeros_like(curved)), axis=1)
+            rows = np.concatenate((rows, group.curve), axis=1)
+        rows = rows.reshape(*weight.shape, -1)
+        if group.scattered:
+            yield group.base + 1, rows, weight, pull
+        else:
+            in_order.append((int(group.base[0]) + 1, rows, weight, pull))
+    begin = min(base for base, *_ in in_order)
+    end = max(base + len(rows) for base, rows, *_ in in_order)
+    count, columns = end - begin, sum(rows.shape[1] for _, rows, *_ in in_order)
+    rows = np.zeros((count, columns, in_order[0][1].shape[2]))
+    weight, pull = np.zeros((count, columns)), np.zeros((count, columns))
+    first = 0
+    for base, *parts in in_order:
+        own = slice(base - begin, base - begin + len(parts[0])), slice(first, first + parts[0].shape[1])
+        for to, part in zip((rows, weight, pull), parts, strict=True):
+            to[own] = part
+        first = own[1].stop
+    yield slice(begin, end), rows, weight, pull
 
 
 def _solved(blocks: Array, gradient: Array, scale: Array, free: Array, stiff: Array, wide: int) -> Array:
@@ -188,17 +224,10 @@ def _solved(blocks: Array, gradient: Array, scale: Array, free: Array, stiff: Ar
     return np.asarray(-used * solveh_banded(band, used * gradient, overwrite_ab=True, check_finite=False))
 
 
-def _add(to: Array, place: Index, rows: Array) -> None:
-    """Add rows at places in order; `ufunc.at`, which bears equal ones, takes many times as long."""
-    if (np.diff(place) == 1).all():
-        to[place[0] : place[0] + len(place)] += rows
-    else:
-        np.add.at(to, place, rows)
-
-
 def _toward(
     spline: TimeSpline,
     groups: list[Group],
+    slacks: list[Array],
     changes: list[Array],
     bounds: Bounds,
     step: Array,
@@ -207,7 +236,6 @@ def _toward(
     """The spline after a part of a step that leaves each row some of its slack, and that part; 0: none. And
     (m,) the part of the step that the bounds of each cell bear."""
     m, axes = len(spline), spline.coefficient.shape[1]
-    slacks = [group.slack() for group in groups]
     # of each node, as the step
     most = np.ones(m + 6)
     for group, change, slack in zip(groups, changes, slacks, strict=True):
@@ -239,11 +267,11 @@ def _lower(most: Array, base: Index, part: Array) -> None:
         np.minimum.at(most, base + 1 + k, part)
 
 
-def _advance(groups: list[Group], duals: list[Array], changes: list[Array], mu: float) -> float:
+def _advance(duals: list[Array], slacks: list[Array], changes: list[Array], mu: float) -> float:
     """Step along Newton's direction of the multipliers while all stay positive; the length of the step."""
     moves = [
-        (mu - dual * change) / group.slack() - dual
-        for group, dual, change in zip(groups, duals, changes, strict=True)
+        (mu - dual * change) / slack - dual
+        for dual, slack, change in zip(duals, slacks, changes, strict=True)
     ]
     fall = max(float((-move / dual).max(initial=0.0)) for move, dual in zip(moves, duals, strict=True))
     length = min(1.0, _NEAR / fall) if fall > 0.0 else 1.0

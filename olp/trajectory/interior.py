@@ -26,22 +26,24 @@ _GAUSS = 0.5 + 0.5 * np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])
 _WEIGHT = np.array([5.0, 8.0, 5.0]) / 18.0
 #: 1, t, t^2 at its points
 _POWERS = np.stack((np.ones(3), _GAUSS, _GAUSS**2))
+#: products of the powers in pairs, and of the weights, at its points
+_PAIRED = 0.75 * _WEIGHT * _POWERS[:, None] * _POWERS
 #: coefficients of 1, t, t^2 from the Bernstein ones of a cell
 _MONOMIAL = np.array([[1.0, 0.0, 0.0], [-2.0, 2.0, 0.0], [1.0, -2.0, 1.0]])
 #: share of the distance to the boundary that one step may take
 _NEAR = 0.98
 #: share of its slack that a step leaves to every row
-_LEAVE = 0.03
+_LEAVE = 0.01
 #: factor by which a step that leaves less is shortened
-_BACK = 0.7
+_BACK = 0.85
 #: times that a step is shortened at most
-_TRIES = 30
+_TRIES = 60
 #: first barrier, over the mean time per row
 _FIRST = 0.1
 #: least barrier, over the mean time per row
 _LEAST = 1e-9
 #: (length, factor): the factor by which the barrier falls after a step longer than that
-_FALL = ((0.8, 0.1), (0.5, 0.35), (0.2, 0.7), (-1.0, 1.0))
+_FALL = ((0.9, 0.1), (0.7, 0.3), (0.5, 0.7), (-1.0, 1.0))
 #: change of the time, relative, below which it counts as still
 _DONE = 1e-4
 #: gap that the barrier leaves, relative to the time, below which the search may end
@@ -57,12 +59,11 @@ class Rows:
     """What bounds b at p points of m cells, in order.
 
     `cell` (p,), `t` (p,) the position in it from 0 to 1, `most` (p,) the square of the allowed speed.
-    `acceleration` and `jerk` (3, d, p): the row of each of d axes over the coefficients of 1, t, t^2 of its
-    cell, over the limit."""
+    `acceleration` (2, d, p) and `jerk` (3, d, p): of each of d axes what b, its slope and half its second
+    derivative by t enter them with, over the limit."""
 
     knot: Array
     cell: Index
-    first: Index
     t: Array
     most: Array
     acceleration: Array
@@ -82,22 +83,20 @@ class Rows:
         moves = np.flatnonzero(np.any([np.any(q, axis=0) for q in derivatives], axis=0))
         q1, q2, q3 = (q[:, moves].T for q in derivatives)
         of_a, of_j = (1.0 / (limit[moves, None] * share) for limit in (limits.acceleration, limits.jerk))
-        b, b1 = q2 * of_a, 0.5 * q1 * of_a / h
-        acceleration = np.stack((b, b * t + b1, t * (b * t + 2.0 * b1)))
-        b, b1, b2 = q3 * of_j, 1.5 * q2 * of_j / h, q1 * of_j / (h * h)
-        jerk = np.stack((b, b * t + b1, t * (b * t + 2.0 * b1) + b2))
-        first = np.searchsorted(cell, np.arange(len(knot) - 1))
-        return Rows(knot, cell, first, t, (cap * share) ** 2, acceleration, jerk)
+        acceleration = np.stack((q2 * of_a, 0.5 * q1 * of_a / h))
+        jerk = np.stack((q3 * of_j, 1.5 * q2 * of_j / h, q1 * of_j / (h * h)))
+        return Rows(knot, cell, t, (cap * share) ** 2, acceleration, jerk)
 
     def __len__(self) -> int:
         return len(self.t)
 
     def spread(self, c: Array) -> tuple[Array, Array, Array]:
         """b (p,), and the rows of acceleration and jerk (d, p) times c (3, m), the coefficients of cells."""
-        c0, c1, c2 = (e[self.cell] for e in c)
-        b = c0 + self.t * (c1 + self.t * c2)
+        c0, c1, c2 = c[:, self.cell]
+        over = self.t * c2
+        b, slope = c0 + self.t * (c1 + over), c1 + 2.0 * over
         a, j = self.acceleration, self.jerk
-        return b, a[0] * c0 + a[1] * c1 + a[2] * c2, j[0] * c0 + j[1] * c1 + j[2] * c2
+        return b, a[0] * b + a[1] * slope, j[0] * b + j[1] * slope + j[2] * c2
 
     def usage(self, c: Array) -> Array:
         """(p,) the largest of the ratios: speed, and those of acceleration and jerk, to their bounds."""
@@ -148,9 +147,9 @@ class Spline:
         """Gradient (3, m) and Hessian (3, 3, m) of the time in the coefficients of the cells."""
         root = 1.0 / np.sqrt(np.einsum("ig,im->gm", _POWERS, c))
         cube = root**3
-        gradient = -0.5 * self.h * np.einsum("g,ig,gm->im", _WEIGHT, _POWERS, cube)
-        hessian = 0.75 * self.h * np.einsum("g,ig,jg,gm->ijm", _WEIGHT, _POWERS, _POWERS, cube * root * root)
-        return gradient, hessian
+        gradient = (-0.5 * _WEIGHT * _POWERS) @ cube
+        hessian = _PAIRED.reshape(9, 3) @ (cube * root * root)
+        return self.h * gradient, self.h * hessian.reshape(3, 3, -1)
 
 
 class _State:
@@ -271,7 +270,7 @@ class _Dual:
         return length
 
 
-#: entries of a symmetric 3 x 3 matrix
+#: of b, its slope and half its second derivative: the pairs, and their entries in a symmetric 3 x 3 matrix
 _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
@@ -279,35 +278,47 @@ def _newton(
     rows: Rows, spline: Spline, here: _State, dual: _Dual, beta: Array, mu: float
 ) -> tuple[Array, Array]:
     """Gradient (n - 4,) and upper bands (3, n - 4) of Newton's system in the free coefficients."""
-    p = len(rows)
-    powers = (np.ones(p), rows.t, rows.t * rows.t)
-    gradient, hessian = np.zeros((3, p)), np.zeros((6, p))
-    ab, au = (1.0 - here.a, 1.0 + here.a), (1.0 - here.u, 1.0 + here.u)
-    pull = mu * (1.0 / ab[0] - 1.0 / ab[1])
-    weight = dual.a[0] / ab[0] + dual.a[1] / ab[1]
-    for i in range(3):
-        gradient[i] = (pull * rows.acceleration[i]).sum(axis=0)
-    for k, (i, j) in enumerate(_PAIRS):
-        hessian[k] = (weight * rows.acceleration[i] * rows.acceleration[j]).sum(axis=0)
-    # rows of jerk, 1/sqrt(b) -+ L over 1/sqrt(b): gradient of_root w -+ root J with w = 1, t, t^2
+    gradient, hessian = np.zeros((3, len(rows))), np.zeros((6, len(rows)))
+    a_above, a_below = 1.0 / (1.0 - here.a), 1.0 / (1.0 + here.a)
+    u_above, u_below = 1.0 / (1.0 - here.u), 1.0 / (1.0 + here.u)
+    # rows of jerk, 1/sqrt(b) -+ L over 1/sqrt(b): gradient of_root w -+ root J with w for b alone
     of_root = -0.5 / here.b
-    high, low = dual.u[0] / au[0], dual.u[1] / au[1]
-    weight = (high + low) * here.b
-    pull = mu * (1.0 / au[0] - 1.0 / au[1]) * here.root
+    high, low = dual.u[0] * u_above, dual.u[1] * u_below
+    both = high + low
+    for factor, weight, pull in (
+        (rows.acceleration, dual.a[0] * a_above + dual.a[1] * a_below, a_above - a_below),
+        (rows.jerk, both * here.b, (u_above - u_below) * here.root),
+    ):
+        weighted = weight * factor
+        for i, row in enumerate(factor):
+            gradient[i] += (pull * row).sum(axis=0)
+        for k, (i, j) in enumerate(_PAIRS):
+            if j < len(factor):
+                hessian[k] += (weighted[i] * factor[j]).sum(axis=0)
+    gradient[0] += 1.0 / (here.v * rows.most) - of_root * (u_above + u_below).sum(axis=0)
     cross = (low - high) * (of_root * here.root)
-    mixed = [(cross * row).sum(axis=0) for row in rows.jerk]
-    for i in range(3):
-        gradient[i] += (pull * rows.jerk[i]).sum(axis=0)
-    for k, (i, j) in enumerate(_PAIRS):
-        hessian[k] += (weight * rows.jerk[i] * rows.jerk[j]).sum(axis=0)
-        hessian[k] += powers[i] * mixed[j] + powers[j] * mixed[i]
-    along = mu / (here.v * rows.most) - mu * of_root * (1.0 / au[0] + 1.0 / au[1]).sum(axis=0)
-    square = dual.v / (here.v * rows.most**2) + of_root**2 * (high + low).sum(axis=0)
-    for i in range(3):
-        gradient[i] += along * powers[i]
-    for k, (i, j) in enumerate(_PAIRS):
-        hessian[k] += square * powers[i] * powers[j]
-    return _banded(rows, spline, gradient, hessian, dual, beta, mu)
+    for k, row in enumerate(rows.jerk):
+        hessian[k] += (2.0 if k == 0 else 1.0) * (cross * row).sum(axis=0)
+    hessian[0] += dual.v / (here.v * rows.most**2) + of_root**2 * both.sum(axis=0)
+    return _banded(rows, spline, mu * gradient, hessian, dual, beta, mu)
+
+
+def _by_powers(t: Array, gradient: Array, hessian: Array) -> tuple[Array, Array]:
+    """Gradient (3, p) and matrix (6, p) in b, its slope and half its second derivative at `t` (p,), in the
+    coefficients of 1, t, t^2."""
+    g0, g1, g2 = gradient
+    h00, h01, h02, h11, h12, h22 = hessian
+    # by the columns of the matrix first, then by its rows
+    k01, k11 = t * h00 + h01, t * h01 + h11
+    k02, k12, k22 = (
+        t * (t * h00 + 2.0 * h01) + h02,
+        t * (t * h01 + 2.0 * h11) + h12,
+        t * (t * h02 + 2.0 * h12) + h22,
+    )
+    return (
+        np.stack((g0, t * g0 + g1, t * (t * g0 + 2.0 * g1) + g2)),
+        np.stack((h00, k01, k02, t * k01 + k11, t * k02 + k12, t * (t * k02 + 2.0 * k12) + k22)),
+    )
 
 
 def _banded(
@@ -315,17 +326,18 @@ def _banded(
 ) -> tuple[Array, Array]:
     """Sums of the rows by cell, then by coefficient, with the objective and the rows beta > 0."""
     m = len(spline.h)
-    of_cell = np.add.reduceat(gradient, rows.first, axis=1)
-    by_cell = np.add.reduceat(hessian, rows.first, axis=1)
-    time_gradient, time_hessian = spline.objective(spline.cells(beta))
-    of_cell += time_gradient
-    full = time_hessian
-    for k, (i, j) in enumerate(_PAIRS):
-        full[i, j] += by_cell[k]
+    by_point = np.concatenate(_by_powers(rows.t, gradient, hessian))
+    by_cell = [np.bincount(rows.cell, of_point, m) for of_point in by_point]
+    of_cell, full = spline.objective(spline.cells(beta))
+    of_cell += by_cell[:3]
+    for some, (i, j) in zip(by_cell[3:], _PAIRS, strict=True):
+        full[i, j] += some
         if i != j:
-            full[j, i] += by_cell[k]
-    g3 = np.einsum("ikm,im->km", spline.map, of_cell)
-    h3 = np.einsum("ikm,ijm,jlm->klm", spline.map, full, spline.map, optimize=True)
+            full[j, i] += some
+    to = spline.map
+    g3 = (to * of_cell[:, None]).sum(axis=0)
+    half = (full[:, :, None] * to).sum(axis=1)
+    h3 = (to[:, :, None] * half[:, None]).sum(axis=0)
     g, band = np.zeros(m + 2), np.zeros((3, m + 2))
     for k in range(3):
         g[k : k + m] += g3[k]

@@ -154,13 +154,13 @@ class _Tube:
                 slope[:, i, 1:4, i] = by_c
             slope[:, :, :4, axes] = by_h.transpose(0, 2, 1)
         off = place_mm - self.centre
-        groups.append(_round(self.knot - 1, off, _USED * self.ball, slope))
+        groups.append(replace(_round(self.knot - 1, off, _USED * self.ball, slope), scattered=True))
         some = np.flatnonzero(self.side.any(axis=1))
         beyond = 1.0 - (off[some] * self.side[some]).sum(axis=1)
         along = none[:, :1]
         if slopes:
             along = -np.einsum("ri,riqb->rqb", self.side[some], slope[some])[:, None]
-        groups.append(Group(self.knot[some] - 1, beyond[:, None], False, along))
+        groups.append(Group(self.knot[some] - 1, beyond[:, None], False, along, scattered=True))
         middle, half = 0.5 * (_LONGEST + _SHORTEST), 0.5 * (_LONGEST - _SHORTEST)
         slope = np.zeros((m if slopes else 0, 1, NODES, axes + 1))
         if slopes:
