@@ -87,8 +87,10 @@ def plan(
         runs = runs_of(route, limits, tubes=tubes and optimise is not False)
         known: dict[int, Solution] = {}
         if optimise is None:
+            # a run is tried with and without a tube, which begins from the motion without
+            bare: dict[int, Solution | None] = {}
             runs, known = searched(
-                runs, len(route), lambda run: _solution(route, limits, run),
+                runs, len(route), lambda run: _solution(route, limits, run, bare),
                 lambda run: _in_group(route, limits, run),
             )  # fmt: skip
         elif optimise:
@@ -143,7 +145,7 @@ def _legs(
     first, last = stretch.first, stretch.last
     if stretch.runs == 1 or len(stretch.candidates) == 1:
         alone = stretch.runs == 1 and first in known
-        solution = known[first] if alone else _solution(route, limits, stretch)
+        solution = known[first] if alone else _solution(route, limits, stretch, {})
         chosen = [] if solution is None else [(0, last - first, solution)]
     else:
         chosen = contest(_run(route, limits, stretch), stretch.candidates)
@@ -184,10 +186,19 @@ def _run(route: Route, limits: AxisLimits, stretch: Stretch) -> Run:
     return Run(own, limits)
 
 
-def _solution(route: Route, limits: AxisLimits, stretch: Stretch) -> Solution | None:
-    """The fastest motion of a stretch along which one solver drives, None where all fail."""
+def _solution(
+    route: Route, limits: AxisLimits, stretch: Stretch, bare: dict[int, Solution | None]
+) -> Solution | None:
+    """The fastest motion of a stretch along which one solver drives, None where all fail. `bare` keeps what
+    is found of optimised runs without a tube, by their first waypoint."""
     run = _run(route, limits, stretch)
-    solution = fastest(run, stretch.candidates, stretch.optimise and stretch.runs == 1)
+    optimise = stretch.optimise and stretch.runs == 1
+    if optimise and stretch.first in bare:
+        solution = bare[stretch.first]
+    else:
+        solution = fastest(run, stretch.candidates, optimise)
+        if optimise:
+            bare[stretch.first] = solution
     return improved(run, solution) if solution is not None and stretch.tube else solution
 
 

@@ -59,11 +59,12 @@ def searched(
             chosen.update(short)
     marked = [_optimised(run) if k in chosen else run for k, run in enumerate(runs)]
     tubed = [run for run in marked if run.tube]
-    for run in tubed:
-        known.pop(run.first, None)
+    in_tubes: dict[int, Solution] = {}
     tube = _Search(lambda run: solve(_bare(run)), solve, _TRIAL_CELLS)
-    if tube.worth(tubed, [run.cells for run in tubed], whole_s, known):
-        return marked, known
+    if tube.worth(tubed, [run.cells for run in tubed], whole_s, in_tubes):
+        for run in tubed:
+            known.pop(run.first, None)
+        return marked, known | in_tubes
     return [_bare(run) for run in marked], known
 
 
