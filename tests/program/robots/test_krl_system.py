@@ -10,6 +10,9 @@ from judge.machines import Recipe
 
 import olp
 from olp.core.errors import OlpError, ProgramError
+from olp.core.paired import own_end
+from olp.program.robots.krl import data as krl_data
+from olp.program.robots.krl import reader
 
 RECIPE = Recipe(controller="kuka-krl", tools={}, job_defaults={}, work_offsets={})
 TOOL, BASE = "{X 10,Y -5,Z 120,A 0,B 10,C 0}", "{x 300.0,y 250.0,z -300.0,a 30.0,b 0.0,c 0.0}"
@@ -119,3 +122,19 @@ def test_a_statement_about_errors_moves_nothing(bent: Path) -> None:
         done.replace(b"  ON_ERROR_PROCEED\n", b"").splitlines()[2:]
         == (olp.correct(text.encode(), bent).data.splitlines()[2:])
     )
+
+
+def test_the_end_of_the_program_is_searched_for_once_and_not_for_each_line(
+    bent: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searched: list[int] = []
+
+    def counted(text: bytes) -> int:
+        searched.append(len(text))
+        return own_end(text)
+
+    for module in (reader, krl_data):
+        monkeypatch.setattr(module, "own_end", counted)
+    text = (SRC.replace("  LIN XP1\n", "  LIN XP1\n" * 30) + DAT + CONFIG).encode()
+    olp.correct(text, bent, outside_box="hold")
+    assert 2 <= len(searched) < 30

@@ -77,9 +77,9 @@ class _Reader:
     def __init__(self, data: bytes, setup: Setup) -> None:
         self.data = data
         self.moves = RobotMoves(data, setup, "BASE0")
-        every = list(lines(data))
+        every, end = list(lines(data)), own_end(data)
         self.declared = Declared(data, every)
-        self.lines = [line for line in every if line.begin < own_end(data)]
+        self.lines = [line for line in every if line.begin < end]
         self.flow = flow.Flow(self.lines)
         self.active = Active(data, setup, self.declared, self.moves.frames)
         self.turning = Turning(self.lines)
