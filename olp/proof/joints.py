@@ -211,23 +211,34 @@ def _stretched(expected: Array, end: Array, near: Array, parts: Index, twice: Ma
     """The ends of nominal moves among more moves of the corrected program: each that has `parts` (n,) as
     planned ends with the next one that is where it is expected. One that may pass there `twice` (n,), as an
     arc does, ends with the one that comes nearest to its number of parts."""
-    spare, groups, j = len(end) - len(expected), [], 0
-    expected, end = np.nan_to_num(expected), np.nan_to_num(end)
-    for i, count in enumerate(parts.tolist()):
-        if count and spare:
-            wanted, there = count - 1 if twice[i] else 0, np.zeros(0, np.int64)
-            # mostly it is near by
-            for reach in (min(2 * count + _NEAR_BY, spare), spare):
-                if not there.size:
-                    away = (np.abs(end[j : j + reach + 1] - expected[i]) / near[i]).max(axis=1)
-                    there = np.flatnonzero(away <= 1.0)
-            found = int(there[np.argmin(np.abs(there - wanted))]) if there.size else 0
-            spare -= found
-            j += found
-        groups.append(j)
-        j += 1
+    count, spare, shift = len(expected), len(end) - len(expected), 0
+    expected, end, groups = np.nan_to_num(expected), np.nan_to_num(end), np.arange(count)
+    wanted = np.where(twice, np.maximum(parts - 1, 0), 0)
+    i, run = 0, _NEAR_BY
+    while i < count and shift < spare:
+        # mostly a move ends with the very next one
+        mine = slice(i, i + run)
+        there = _there(end[i + shift : i + shift + run][: count - i], expected[mine], near[mine])
+        at_once = np.append((parts[mine] == 0) | ((wanted[mine] == 0) & there), False)
+        passed = int(np.argmin(at_once))
+        groups[i : i + passed] += shift
+        i, run = i + passed, _NEAR_BY + 2 * passed
+        if passed < len(there):
+            j, left, found = i + shift, spare - shift, np.zeros(0, np.int64)
+            for reach in (min(2 * int(parts[i]) + _NEAR_BY, left), left):
+                if not found.size:
+                    found = np.flatnonzero(_there(end[j : j + reach + 1], expected[i], near[i]))
+            shift += int(found[np.argmin(np.abs(found - wanted[i]))]) if found.size else 0
+            groups[i] = i + shift
+            i += 1
+    groups[i:] += shift
     groups[-1] = len(end) - 1
-    return np.array(groups)
+    return groups
+
+
+def _there(end: Array, expected: Array, near: Array) -> Mask:
+    """(r,) which moves end where it is expected."""
+    return np.asarray((np.abs(end - expected) / near).max(axis=1) <= 1.0)
 
 
 def _deviation(
