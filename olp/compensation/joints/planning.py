@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from olp.compensation.joints.commanded import Rows, led, refuse_beyond, solved
@@ -86,7 +88,7 @@ def planned(path: JointPath, limits: JointLimits) -> JointPlan:
     feed = np.where(path.curves.mask, straight, feed)
     ends = solved(path, runs.move, runs.end, runs.side)
     split = np.flatnonzero(feed[runs.move])
-    begins = solved(path, runs.move[split], runs.begin[split], runs.side[split])
+    begins = _begun(path, runs, ends, split)
     inner = _split(path, begins, ends.only(split), limits)
     rows = Rows.join([ends, *inner])
     rows = rows.only(np.lexsort((rows.share, rows.move)))
@@ -94,6 +96,24 @@ def planned(path: JointPath, limits: JointLimits) -> JointPlan:
         play = Play.of(path, rows, limits.tolerance_mm, limits.tolerance_rad)
         rows = with_play(path, rows, begins.only(begins.share == 0.0), play)
     return _finished(path, rows, straight)
+
+
+def _begun(path: JointPath, runs: Runs, ends: Rows, which: Index) -> Rows:
+    """The begins of some runs. One that begins where the one before ends, as most do, is solved there."""
+    move, before = runs.move[which], np.maximum(which - 1, 0)
+    last = runs.move[before]
+    bends = path.curves.mask | path.held | path.directions.led
+    alike = (which > 0) & (runs.begin[which] == 0.0) & (runs.end[before] == 1.0)
+    alike &= ~bends[move] & ~bends[last] & (path.start[move] == path.end[last]).all(axis=1)
+    alike &= (path.tool[move] == path.tool[last]) & (path.tip[move] == path.tip[last])
+    alike &= (path.shift_mm[move] == path.shift_mm[last]).all(axis=1)
+    same, other = np.flatnonzero(alike), np.flatnonzero(~alike)
+    there = replace(
+        ends.only(before[same]), move=move[same], share=np.zeros(len(same)), side=runs.side[which[same]]
+    )
+    rest = which[other]
+    fresh = solved(path, runs.move[rest], runs.begin[rest], runs.side[rest])
+    return Rows.join([there, fresh]).only(np.argsort(np.append(same, other)))
 
 
 def _corrects_arcs(path: JointPath, runs: Runs) -> bool:
