@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from olp.core.arrays import Array
+from olp.core.machine import Vector
 from olp.core.values import dataclass
 from olp.kinematics.poses import Poses
 
@@ -41,7 +42,11 @@ def plus(a: Entry, b: Entry) -> Entry:
 
 
 def minus(a: Entry, b: Entry) -> Entry:
-    return plus(a, times(b, -1.0)) if isinstance(a, float) else a if isinstance(b, float) and not b else a - b
+    if isinstance(b, float) and b == 0.0:
+        return a
+    if isinstance(a, float) and a == 0.0:
+        return times(b, -1.0)
+    return a - b
 
 
 def triple(values: Array | Sequence[float]) -> Triple:
@@ -85,6 +90,8 @@ class Columns:
 
     def __matmul__(self, other: Columns) -> Columns:
         """First `other`, then this."""
+        if self is STILL or other is STILL:
+            return other if self is STILL else self
         x, y, z = zip(*other.turn, strict=True)
         a, b, c = ((dot(row, x), dot(row, y), dot(row, z)) for row in self.turn)
         return Columns((a, b, c), self.at(other.shift))
@@ -138,29 +145,32 @@ def shifted(vector: Triple) -> Columns:
 
 def about(point: Triple, turn: Columns, offset: Triple = (0.0, 0.0, 0.0)) -> Columns:
     """Turns about a point, then a shift: Trans(point) Trans(offset) R Trans(-point)."""
+    if turn is STILL:
+        return shifted(offset)
     return Columns(turn.turn, add(subtract(point, turn.turned(point)), offset))
 
 
-def turn_about(direction: Triple, angle_rad: Entry) -> Columns:
+def turn_about(direction: Vector, angle_rad: Entry) -> Columns:
     """Rotations about a unit vector (Rodrigues)."""
+    if isinstance(angle_rad, float) and angle_rad == 0.0:
+        return STILL
     x, y, z = direction
-    skew: tuple[Triple, Triple, Triple] = (
-        (0.0, times(z, -1.0), y), (z, 0.0, times(x, -1.0)), (times(y, -1.0), x, 0.0),
-    )  # fmt: skip
-    squared = Columns(skew, (0.0, 0.0, 0.0)) @ Columns(skew, (0.0, 0.0, 0.0))
-    sine = _sine(angle_rad)
     # 1 - cos, without cancelling at small angles
-    half = _sine(times(angle_rad, 0.5))
+    sine, half = _sine(angle_rad), _sine(times(angle_rad, 0.5))
     versine = times(times(half, half), 2.0)
+    across: Triple = (times(sine, x), times(sine, y), times(sine, z))
+    xy, yz, zx = times(versine, x * y), times(versine, y * z), times(versine, z * x)
     first, second, third = (
-        (
-            plus(UPRIGHT[i][0], plus(times(skew[i][0], sine), times(squared.turn[i][0], versine))),
-            plus(UPRIGHT[i][1], plus(times(skew[i][1], sine), times(squared.turn[i][1], versine))),
-            plus(UPRIGHT[i][2], plus(times(skew[i][2], sine), times(squared.turn[i][2], versine))),
-        )
-        for i in range(3)
+        plus(1.0, times(versine, -(one * one + other * other))) for one, other in ((y, z), (z, x), (x, y))
     )
-    return Columns((first, second, third), (0.0, 0.0, 0.0))
+    return Columns(
+        (
+            (first, minus(xy, across[2]), plus(zx, across[1])),
+            (plus(xy, across[2]), second, minus(yz, across[0])),
+            (minus(zx, across[1]), plus(yz, across[0]), third),
+        ),
+        (0.0, 0.0, 0.0),
+    )
 
 
 def tilted(angles_rad: Triple, *, reverse: bool = False) -> Columns:

@@ -6,6 +6,8 @@ Y E V. R and V are the motion on the line as it really lies, E the error motions
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from olp.core.arrays import Array
@@ -28,6 +30,9 @@ from olp.kinematics.columns import (
 from olp.kinematics.errors import OWN, JointErrors
 from olp.kinematics.structure import Joint
 
+#: Directions of lines that are kept: those of the axes of some machines.
+_LINES = 64
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Yielded:
@@ -40,10 +45,9 @@ class Yielded:
 
 def nominal_motion(joint: Joint, value: Array) -> Columns:
     """The motion at axis values (n,) in mm or deg."""
-    direction = triple(joint.direction)
     if joint.kind == "rotary":
-        return about(triple(joint.point_mm), turn_about(direction, np.radians(value)))
-    return shifted(scaled(direction, value))
+        return about(triple(joint.point_mm), turn_about(joint.direction, np.radians(value)))
+    return shifted(scaled(triple(joint.direction), value))
 
 
 def actual_motion(
@@ -108,15 +112,20 @@ def _body(
     return about(point, tilted((motions[3], motions[4], motions[5]), reverse=on_workpiece), moved)
 
 
+@functools.lru_cache(maxsize=_LINES)
+def _leaning(direction: Vector, tilt_rad: Vector) -> Vector:
+    """The direction of a line that is tilted."""
+    x, y, z = (float(entry) for entry in tilted(triple(tilt_rad)).turned(triple(direction)))
+    return x, y, z
+
+
 def _on_its_line(joint: Joint, errors: JointErrors, value: Array, own: Entry) -> Columns:
     """The motion along or about the line where it really is; at axis zero nothing moves but the own error."""
-    direction = triple(joint.direction)
     if joint.kind == "rotary":
-        turn = turn_about(
-            tilted(triple(errors.tilt_rad)).turned(direction),
-            plus(plus(np.radians(value), float(errors.zero)), own),
-        )
+        angle = plus(plus(np.radians(value), float(errors.zero)), own)
+        turn = turn_about(_leaning(joint.direction, errors.tilt_rad), angle)
         return about(add(triple(joint.point_mm), triple(errors.shift_mm)), turn)
+    direction = triple(joint.direction)
     along = scaled(direction, plus(plus(value, float(errors.zero)), own))
     across = triple(np.cross(errors.tilt_rad, joint.direction))
     return shifted(add(along, scaled(across, value - errors.datum)))

@@ -144,7 +144,14 @@ def _under_masses(
     for on_workpiece, names in _sides(structure):
         bodies = _bodies(names, motions, on_workpiece)
         weights = _weights(structure, errors, names, bodies, on_workpiece)
-        for row, name in enumerate(names):
+        sign = -1.0 if on_workpiece else 1.0
+        # of all that is outboard: its weight, and the moment of that about the origin
+        pull: Triple = (0.0, 0.0, 0.0)
+        moment: Triple = (0.0, 0.0, 0.0)
+        for row, name in reversed(tuple(enumerate(names))):
+            for kg, centre in weights[name]:
+                weight = scaled(gravity, kg)
+                pull, moment = add(pull, weight), add(moment, cross(centre, scaled(weight, 1.0 / _MM_PER_M)))
             gives = errors.yields.get(name)
             if gives is None:
                 continue
@@ -152,14 +159,8 @@ def _under_masses(
             joint = structure.joints[name]
             moving = joint.kind != "rotary"
             point = (bodies[name] if moving else stator).at(triple(joint.point_mm))
-            force: Triple = (0.0, 0.0, 0.0)
-            torque: Triple = (0.0, 0.0, 0.0)
-            for kg, centre in (w for outer in names[row:] for w in weights[outer]):
-                pull = scaled(gravity, kg)
-                force = add(force, pull)
-                torque = add(torque, cross(subtract(centre, point), scaled(pull, 1.0 / _MM_PER_M)))
-            sign = -1.0 if on_workpiece else 1.0
-            force = scaled(stator.turned_back(force), sign)
+            torque = subtract(moment, cross(point, scaled(pull, 1.0 / _MM_PER_M)))
+            force = scaled(stator.turned_back(pull), sign)
             torque = scaled(stator.turned_back(torque), sign)
             along = dot(force if moving else torque, triple(joint.direction))
             gone[name] = Yielded(
