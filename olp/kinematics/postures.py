@@ -88,9 +88,9 @@ class Arm:
         centre, own = motion.at(self.wrist), np.radians(axes[:, self.columns])
         with np.errstate(invalid="ignore", divide="ignore"):
             (first,) = nearer([(angle,) for angle in self._first(centre)], own[:, 0])
-            second, third = nearer(self._shoulder_and_elbow(centre, first), own[:, 2], 1)
+            ((second, third),) = self._shoulder_and_elbow(centre, first, own[:, 2])
             held = self._turn(0, first) @ self._turn(1, second) @ self._turn(2, third)
-            wrist = nearer(self._wrist(np.swapaxes(held, -1, -2) @ motion.rotation), own[:, 4], 1)
+            (wrist,) = self._wrist(np.swapaxes(held, -1, -2) @ motion.rotation, own[:, 4])
         return self._beside(axes, (first, second, third, *wrist))
 
     def _beside(self, axes: Array, angles: tuple[Array, ...]) -> Array:
@@ -147,34 +147,42 @@ class Arm:
         near = np.linalg.norm(across, axis=1) < _ABOVE_MM
         return [np.where(near, np.nan, angle) for angle in found]
 
-    def _shoulder_and_elbow(self, centre: Array, first: Array) -> list[tuple[Array, Array]]:
-        """(n,) angles of the second and the third axis."""
+    def _shoulder_and_elbow(
+        self, centre: Array, first: Array, near: Array | None = None
+    ) -> Sequence[tuple[Array, ...]]:
+        """(n,) angles of the second and the third axis; those alone whose third is next to `near`."""
         place = self.point[0] + turned(self._turn(0, -first), centre - self.point[0])
-        return self._lower_arm(place, self.wrist)
+        return self._lower_arm(place, self.wrist, near)
 
-    def _lower_arm(self, place: Array, end: Array) -> list[tuple[Array, Array]]:
-        """(n,) angles of the second and the third axis that bring the point `end` to places (n, 3)."""
+    def _lower_arm(self, place: Array, end: Array, near: Array | None = None) -> Sequence[tuple[Array, ...]]:
+        """(n,) angles of the second and the third axis that bring the point `end` to places (n, 3); those
+        alone whose third is next to `near`."""
         side = self.direction[1]
         lower, upper = self.point[2] - self.point[1], end - self.point[2]
         reach = place - self.point[1]
         lower, upper, reach = (v - (v @ side)[..., None] * side for v in (lower, upper, reach))
         want = (np.sum(reach * reach, axis=1) - lower @ lower - upper @ upper) / 2.0
-        pairs = []
         # the third axis may run against the second
-        for angle in met(lower @ upper, lower @ np.cross(side, upper), want):
-            third = angle * float(self.direction[2] @ side)
+        sense = float(self.direction[2] @ side)
+        bends: Sequence[tuple[Array, ...]] = [
+            (angle, angle * sense) for angle in met(lower @ upper, lower @ np.cross(side, upper), want)
+        ]
+        pairs = []
+        for angle, third in bends if near is None else [nearer(bends, near, 1)]:
             tip = lower + turned(axis_rotation(side, angle), upper)
             pairs.append((angle_about(side, tip, reach), third))
         return pairs
 
-    def _wrist(self, rest: Array) -> list[tuple[Array, Array, Array]]:
-        """(n,) angles of the last three axes, whose rotation is `rest` (n, 3, 3)."""
+    def _wrist(self, rest: Array, near: Array | None = None) -> list[tuple[Array, Array, Array]]:
+        """(n,) angles of the last three axes, whose rotation is `rest` (n, 3, 3); those alone whose fifth is
+        next to `near`."""
         fourth, fifth, sixth = self.direction[3:]
         along = turned(rest, sixth)
         inner = fifth * (fifth @ sixth)
         want = along @ fourth - fourth @ inner
         found = []
-        for angle in met(fourth @ (sixth - inner), fourth @ np.cross(fifth, sixth), want):
+        bends = [(angle,) for angle in met(fourth @ (sixth - inner), fourth @ np.cross(fifth, sixth), want)]
+        for (angle,) in bends if near is None else [nearer(bends, near)]:
             bent = self._turn(4, angle)
             start = turned(bent, sixth)
             straight = np.linalg.norm(np.cross(start, fourth), axis=1) < _STRAIGHT
@@ -226,7 +234,10 @@ def angle_about(axis: Array, start: Array, end: Array) -> Array:
     """(n,) angles about an axis that turn one vector toward another."""
     start = start - (start @ axis)[..., None] * axis
     end = end - (end @ axis)[..., None] * axis
-    return np.asarray(np.arctan2(np.sum(np.cross(start, end) * axis, axis=1), np.sum(start * end, axis=1)))
+    x, y, z = axis
+    across = start @ np.array(((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0)))
+    sine, cosine = (np.einsum("...k,...k->...", one, end) for one in (across, start))
+    return np.asarray(np.arctan2(sine, cosine))
 
 
 def wrapped(degrees: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import asin, atan2, cos, degrees, hypot, pi, radians, sin
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,10 @@ NO_TURN: Quaternion = (1.0, 0.0, 0.0, 0.0)
 SAME_TURN = 2e-6
 #: mm; positions that are nearer to each other are the same
 SAME_PLACE_MM = 1e-6
+#: A row of a matrix.
+_Row = tuple[Any, Any, Any]
+#: The rows of the rotation that turns nothing.
+_UNTURNED: Turn = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 #: Two quaternions this near are led from one to the other along a straight line.
 _NEAR = 1.0 - 1e-12
 #: Below this cosine of the second of three angles the first and the third turn alike.
@@ -98,9 +103,16 @@ def turn_of(a: Quaternion) -> Turn | None:
     """The rows of a rotation; None where it turns nothing."""
     if a[1:] == ZERO:
         return None
-    columns = [rotated(a, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
-    first, second, third = ((row[0], row[1], row[2]) for row in zip(*columns, strict=True))
-    return (first, second, third)
+    return _rows(*a)
+
+
+def _rows(w: Any, x: Any, y: Any, z: Any) -> tuple[_Row, _Row, _Row]:
+    """The rows of the matrix of a quaternion, whose components are numbers or columns."""
+    return (
+        (w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z),
+    )
 
 
 def of_zyx(angles_deg: Sequence[float]) -> Quaternion:
@@ -145,7 +157,7 @@ def _whole_turns(near: Vector) -> Vector:
 def zyx_of(a: Quaternion, first_deg: float = 0.0) -> Vector:
     """The angles in degrees whose Rz(first) Ry(second) Rx(third) is a rotation. Where the second is a right
     angle and only two of them are known together, the first is `first_deg`."""
-    (xx, xy, xz), (yx, yy, yz), (zx, _, _) = matrix(a).tolist()
+    (xx, xy, xz), (yx, yy, yz), (zx, _, _) = turn_of(a) or _UNTURNED
     first = atan2(yx, xx) if hypot(xx, yx) > _UPRIGHT else radians(first_deg)
     cosine, sine = cos(first), sin(first)
     second = atan2(-zx, cosine * xx + sine * yx)
@@ -178,15 +190,9 @@ def of_vectors(vectors: Array) -> Array:
 def matrices(turns: Array) -> Array:
     """(n, 3, 3) rotations (n, 4) as matrices."""
     w, x, y, z = turns.T
-    rows = (
-        (w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
-        (2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)),
-        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z),
-    )
-    return np.moveaxis(np.array(rows), -1, 0)
+    return np.moveaxis(np.array(_rows(w, x, y, z)), -1, 0)
 
 
 def matrix(a: Quaternion) -> Array:
     """(3, 3) the rotation as a matrix."""
-    turn = turn_of(a)
-    return np.eye(3) if turn is None else np.array(turn)
+    return np.array(turn_of(a) or _UNTURNED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,14 +18,17 @@ _TURNED = (0, 3, 5)
 _LETTERS = ((b"N", 3), (b"U", 1), (b"T", 0))
 #: Branches that are nearer to their border than this, mm or deg, are on both sides.
 _BORDER = 0.01
+#: Configurations whose words are kept: a program has few.
+_KEPT = 256
 #: deg beyond half a turn that are rounding of the text
 _ROUNDING_DEG = 0.01
 
 
-def words_of(data: bytes, span: Span) -> tuple[tuple[float, ...], tuple[Span, ...]]:
+@functools.lru_cache(maxsize=_KEPT)
+def words_of(text: bytes) -> tuple[tuple[float, ...], tuple[Span, ...]]:
     """The words of a configuration, 1 for N, U and T, and the bytes of its turns. NaN where it is in another
     form."""
-    match = _CONFIG.fullmatch(data, *span)
+    match = _CONFIG.fullmatch(text)
     if match is None:
         return (np.nan,) * 6, ()
     letters = [float(match[k + 1].upper() == letter) for k, (letter, _) in enumerate(_LETTERS)]

@@ -8,60 +8,26 @@ from __future__ import annotations
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector
 from olp.core.patterns import pattern
-from olp.core.values import dataclass
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
 from olp.program.robots.ls import postures
+from olp.program.robots.ls.manner import CHOSEN, Manner, Manners
 from olp.program.robots.ls.registers import Registers
 from olp.program.robots.ls.text import Line, Position, lines, parts, positions
-from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
+from olp.program.robots.moves import RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose, of_zyx, rotated
 from olp.program.robots.targets import Span, Use
 
-_MOVE = pattern(
-    rb"(?i)\s*([LJ])\s+(PR?)\[\s*(\d+|R\[[^\]]*\])\s*(?::[^\]]*)?\]\s+(?:(\d+\.?\d*)\s*(mm/sec|cm/min|inch/min|%|deg/sec|"
-    rb"sec|msec)|(R\[[^\]]*\]\S*|\S+))\s+(FINE|CNT\s*\d+|CNT\s*R\[[^\]]*\]|CD\d+|CR\d+)?(.*)"
-)
 #: The same of an arc, whose via point stands first.
 _ARC = pattern(rb"(?i)(\s*)C\s+P\[\s*(\d+)\s*(?::[^\]]*)?\]\s+(PR?\[.*)")
 #: Moves that are not read, by their letters.
 _OTHERS = {"C": "an arc through a register", "A": "an arc of several moves", "S": "a spline"}
 _OTHER_MOVE = pattern(rb"(?i)\s*[CASLJ]\s+PR?\[")
-_OFFSET = pattern(rb"(?i)\b(Tool_Offset|Offset|WZVersatz|Versatz)\b\s*(?:,\s*PR\[\s*(\d+)[^\]]*\])?")
-_INCREMENT = pattern(rb"(?i)\bINC\b")
-_COORD = pattern(rb"(?i)\bCOORD\b")
-_SKIP = pattern(rb"(?i)\bSkip(?:Jump)?\b")
-_INDEX = rb"\[[^\]]*\]"
-_VALUE = rb"(?:[-+]?\d*\.?\d+|R" + _INDEX + rb")"
-_SEAM = rb":?\s*(?:Arc|Weld)\s+(?:Start|End)\s*" + _INDEX
-#: Words behind a move that change nothing of its path.
-_PLAIN_TAIL = rb"ACC\s*" + _VALUE + rb"|PTH|(?:Ind\.)?EV\s*\d+\s*%|" + _SEAM
-#: Words that belong to the whole move, or to one of its ends, so that it is never split.
-_WHOLE_TAIL = (
-    rb"Skip(?:Jump)?\s*,\s*LBL" + _INDEX + rb"(?:\s*,\s*PR" + _INDEX + rb"\s*=\s*[LJ]POS)?|"
-    rb"(?:AP|RT)_LD\s*\d+|T[AB]\s*" + _VALUE + rb"\s*sec\s*,.*|DB\s*" + _VALUE + rb"\s*mm\s*,.*"
-)  # fmt: skip
-_SHIFTED_TAIL = rb"(?:Tool_Offset|Offset|WZVersatz|Versatz)(?:\s*,\s*PR" + _INDEX + rb")?"
-_TAIL = pattern(
-    rb"(?i)(?:\s*(?:" + _PLAIN_TAIL + rb"|" + _WHOLE_TAIL + rb"|" + _SHIFTED_TAIL + rb")(?![\w(\[]))*\s*"
-)
-_HELD = pattern(rb"(?i)(?<![\w.])(?:" + _WHOLE_TAIL + rb")")
-#: Other words of a move, in capitals, and why they are not read.
-_UNREAD = {
-    b"RTCP": "the tool stands still, and the robot moves the part",
-    b"WJNT": "the wrist turns by its joints, and the tool not evenly",
-}
-_WORD = pattern(rb"[\w.]+|\S")
-_WRIST = pattern(rb"(?i)\bWjnt\b")
-#: Words of a move by which a sensor moves its target.
-_SENSED = pattern(rb"(?i)\bVOFFSET\b|\bSearch\[|\bTrack\b")
 #: Statements by which later targets are moved.
 _MOVING = pattern(
     rb"(?i)\s*(?:Touch\s+Offset|Search\s+Start|Track\b|VISION\s+.*OFFSET|(?:TOOL_)?OFFSET\s+COND)"
 )
-#: The number of a position or register that a register chooses.
-_CHOSEN = -1
 _COPIED = pattern(rb"(?i)\s*PR\[[^\]]*\]\s*=(.*)")
 _NUMBERED = pattern(rb"(?i)(?<!\w)P\[\s*(\d+)")
 _ASSIGNED = pattern(rb"(?i)\s*P\[\s*(\d+)[^\]]*\]\s*=")
@@ -77,22 +43,8 @@ _STILL = pattern(
 )
 _ENDS = pattern(rb"(?i)\s*(?:END|ABORT|JMP\s+LBL\b[^,]*)\s*")
 _BLOCK = pattern(rb"(?i)\s*(?:(IF\b.*THEN)|(FOR\b.*)|(ELSE)|(ENDIF|ENDFOR))\s*")
-_ALONG_TOOL = pattern(rb"(?i)\b(?:Tool_Offset|WZVersatz)\b")
+_POSE = frozenset("XYZWPR")
 _JOINTS = ("J1", "J2", "J3", "J4", "J5", "J6")
-#: mm/s in one unit of a speed
-_SPEEDS = {b"mm/sec": 1.0, b"cm/min": 10.0 / 60.0, b"inch/min": 25.4 / 60.0}
-
-
-@dataclass(frozen=True, slots=True)
-class _Move:
-    """The words of a move: straight or not, the number of its position, its speed in mm/s, its `tail`."""
-
-    straight: bool
-    register: bool
-    number: int
-    feed: float
-    timed: bool
-    tail: bytes
 
 
 def read(
@@ -110,6 +62,7 @@ class _Reader:
         self.data, self.setup = data, setup
         self.moves = RobotMoves(data, setup, "UFRAME0")
         self.registers = Registers()
+        self.manners = Manners(arm=self.moves.arm)
         self.positions: dict[int, list[Position]] = {}
         self.known: dict[int, int] = {}
         #: positions that registers get the numbers of
@@ -138,14 +91,14 @@ class _Reader:
 
     def _statement(self, line: Line) -> None:
         text = line.text
-        move = _MOVE.fullmatch(text)
+        move = self.manners.of(text)
         if move is not None:
-            self._move(line, self._words(move))
+            self._move(line, *move)
             return
         arc = _ARC.fullmatch(text)
-        move = None if arc is None else _MOVE.fullmatch(arc[1] + b"L " + arc[3])
+        move = None if arc is None else self.manners.of(arc[1] + b"L " + arc[3])
         if arc is not None and move is not None:
-            self._arc(line, int(arc[2]), self._words(move))
+            self._arc(line, int(arc[2]), *move)
             return
         if _OTHER_MOVE.match(text):
             letter = text.split()[0].upper().decode("latin-1")
@@ -189,49 +142,38 @@ class _Reader:
 
     # -- moves ---------------------------------------------------------------------------------------
 
-    @staticmethod
-    def _words(move: object) -> _Move:
-        groups = move.groups(b"")  # type: ignore[attr-defined]
-        unit = groups[4].lower()
-        feed = float(groups[3]) * _SPEEDS[unit] if unit in _SPEEDS else NAN
-        return _Move(
-            groups[0].upper() == b"L", groups[1].upper() == b"PR",
-            int(groups[2]) if groups[2].isdigit() else _CHOSEN, feed,
-            unit in (b"sec", b"msec") or groups[5].lower().endswith((b"]sec", b"]msec")), groups[7],
-        )  # fmt: skip
-
-    def _move(self, line: Line, move: _Move) -> None:
-        self._begin(line, move)
-        position = None if move.register else self._position(move.number, line)
+    def _move(self, line: Line, move: Manner, number: int) -> None:
+        self._begin(line, move, number)
+        position = None if move.register else self._position(number, line)
         shift = self._shift(move, position)
         begin = self.data.index(b"[", line.first) + 1
         place = begin, self.data.index(b"]", begin)
         if position is not None and "X" not in position.axes:
-            self.moves.joint_move(line.line, lambda: self._joints(line, move, position, place))
+            self.moves.joint_move(line.line, lambda: self._joints(line, move, number, position, place))
             return
         if position is None or shift is None:
             self.moves.left(line.line)
             what = "left as written: the text does not state where this move goes"
             self.moves.remark("left", line.line, what)
             # it may go to a position itself, or to a register that got the numbers of one
-            self.moves.hold(self.copied if position is None else [f"P[{move.number}]"])
+            self.moves.hold(self.copied if position is None else [f"P[{number}]"])
             return
-        along_tool = shift != ZERO and _ALONG_TOOL.search(move.tail) is not None
-        use = self._use(line, move.number, position, place, shift, along_tool=along_tool)
+        along_tool = shift != ZERO and move.offset is not None and move.offset.along_tool
+        use = self._use(line, number, position, place, shift, along_tool=along_tool)
         self.moves.move(
             line.line, use, self._frame(position, line), self._tool(position, line), move.feed,
-            straight=move.straight, whole=move.timed or _HELD.search(move.tail) is not None,
+            straight=move.straight, whole=move.whole,
         )  # fmt: skip
-        if _SKIP.search(move.tail):
+        if move.skips:
             self.moves.known = False
 
-    def _arc(self, line: Line, number: int, move: _Move) -> None:
+    def _arc(self, line: Line, via_number: int, move: Manner, number: int) -> None:
         """An arc through a position to another one."""
-        self._begin(line, move)
-        if move.register or _OFFSET.search(move.tail) or _SKIP.search(move.tail):
+        self._begin(line, move, number)
+        if move.register or move.offset is not None or move.skips:
             raise not_read("an arc to a register, with an offset or with Skip is not read", line.line)
         begin, ends = line.first, []
-        for own in (number, move.number):
+        for own in (via_number, number):
             begin = self.data.index(b"[", begin) + 1
             position = self._position(own, line)
             if "X" not in position.axes:
@@ -244,7 +186,7 @@ class _Reader:
             raise not_read("via point and end of this arc have different frames or tools", line.line)
         self.moves.arc(
             line.line, via, end, frame, tool, move.feed, turned_by_via=True,
-            whole=move.timed or _HELD.search(move.tail) is not None,
+            whole=move.whole,
         )  # fmt: skip
 
     def _use(
@@ -267,39 +209,22 @@ class _Reader:
                 what = f"P[{number}] is in {name} {own}, and {name}_NUM is {other} here: the control stops"
                 self.moves.remark(name, line.line, what)
 
-    def _begin(self, line: Line, move: _Move) -> None:
+    def _begin(self, line: Line, move: Manner, number: int) -> None:
         """What counts for all moves. Raises ProgramError for words of them that are not read."""
         if any(loop and before == self.moves.count for loop, before in self.blocks):
             self.moves.known = False
-        for sign, why in (
-            (_INCREMENT, "is a distance (INC)"),
-            (_COORD, "counts from a positioner (COORD)"),
-            (_SENSED, "goes where a sensor says"),
-        ):
-            if sign.search(move.tail):
-                raise not_read(f"this move {why}, which is not read", line.line)
-        if move.number == _CHOSEN and not move.register:
+        if move.elsewhere:
+            raise not_read(f"this move {move.elsewhere}, which is not read", line.line)
+        if number == CHOSEN and not move.register:
             what = "which position this move goes to is chosen in the run; program it with its number"
             raise not_read(what, line.line)
-        self._tail(move, line)
+        if move.unread:
+            raise not_read(f"{move.unread}; post the move without it", line.line)
 
-    def _tail(self, move: _Move, line: Line) -> None:
-        """Raises ProgramError with the first word behind a move whose effect on its path is not known."""
-        # without joints, and behind J, a wrist turns nothing else
-        tail = move.tail if self.moves.arm and move.straight else _WRIST.sub(b"", move.tail)
-        known = _TAIL.match(tail)
-        word = _WORD.search(tail, 0 if known is None else known.end())
-        if word is not None:
-            why = _UNREAD.get(word[0].upper(), "what it does to the path is not known")
-            raise not_read(
-                f"`{word[0].decode('latin-1')}` behind a move is not read: {why}; post the move without it",
-                line.line,
-            )
-
-    def _joints(self, line: Line, move: _Move, position: Position, place: Span) -> Use | None:
+    def _joints(self, line: Line, move: Manner, number: int, position: Position, place: Span) -> Use | None:
         """How a move uses joint values; None where the text does not state where they lead."""
         axes = position.axes
-        if not set(_JOINTS) <= set(axes) or _OFFSET.search(move.tail):
+        if not set(_JOINTS) <= set(axes) or move.offset is not None:
             return None
         if self.setup.machine.third_level is None:
             what = (
@@ -307,26 +232,24 @@ class _Reader:
             )
             self.moves.remark("level", line.line, what)
             return None
-        index = self.known.get(move.number)
+        index = self.known.get(number)
         if index is None:
             a, b, c, d, e, f = (axes[name][1] for name in _JOINTS)
-            index = self.known[move.number] = self.moves.joint_target(
+            index = self.known[number] = self.moves.joint_target(
                 position.line, position.span, [axes[name][0] for name in _JOINTS], (a, b, c, d, e, f),
-                position.outer, f"P[{move.number}]", position.span,
+                position.outer, f"P[{number}]", position.span,
             )  # fmt: skip
         return Use(index, line.span, place, place, zone=(line.first, line.span[1]))
 
-    def _shift(self, move: _Move, position: Position | None) -> Vector | None:
+    def _shift(self, move: Manner, position: Position | None) -> Vector | None:
         """How far a move goes from its position, along its frame; None where the text does not say it."""
-        offset = _OFFSET.search(move.tail)
+        offset = move.offset
         if offset is None or position is None or "X" not in position.axes:
-            return (0.0, 0.0, 0.0)
-        pose = None if offset[2] is None else self.registers.pose(int(offset[2]))
-        if pose is None or pose.turn[1:] != (0.0, 0.0, 0.0):
+            return ZERO
+        pose = None if offset.register is None else self.registers.pose(offset.register)
+        if pose is None or pose.turn[1:] != ZERO:
             return None
-        if offset[1].lower() in (b"offset", b"versatz"):
-            return pose.origin_mm
-        return rotated(_turn(position), pose.origin_mm)
+        return pose.origin_mm if offset.in_frame else rotated(_turn(position), pose.origin_mm)
 
     def _position(self, number: int, line: Line) -> Position:
         found = self.positions.get(number, [])
@@ -341,7 +264,8 @@ class _Reader:
                 line=line.line,
                 code="OLP533",
             )
-        if not any(name[0] in "XJ" for name in axes) or ("X" in axes and not {*"YZWPR"} <= set(axes)):
+        posed = "X" in axes and axes.keys() >= _POSE
+        if not posed and ("X" in axes or not any(name[0] == "J" for name in axes)):
             raise ProgramError(
                 f"the position P[{number}] of line {found[0].line} is not taught, or in another form",
                 line=line.line,
@@ -354,9 +278,11 @@ class _Reader:
         if known is None:
             axes = position.axes
             (x, a), (y, b), (z, c) = (axes[name] for name in "XYZ")
-            key = self.data[slice(*position.config)], position.others
-            config = float(self.configs.setdefault(key, len(self.configs)))
-            words, turns = postures.words_of(self.data, position.config)
+            text = self.data[slice(*position.config)]
+            config = float(self.configs.setdefault((text, position.others), len(self.configs)))
+            words, own = postures.words_of(text)
+            first = position.config[0]
+            turns = tuple((first + begin, first + end) for begin, end in own)
             outer = position.outer
             known = self.known[number] = self.moves.target(
                 position.line, position.span, (x, y, z), (a, b, c), _turn(position),

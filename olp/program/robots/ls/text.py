@@ -2,16 +2,34 @@
 
 from __future__ import annotations
 
+import re
+
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.robots.targets import ABSENT, Span
 from olp.program.text.numbers import LARGEST
 
+#: The letters of a position in their usual order, and their units.
+_LETTERS = (b"X", b"Y", b"Z", b"W", b"P", b"R")
+_USUAL_UNITS = (b"mm", b"mm", b"mm", b"deg", b"deg", b"deg")
+_AXES = tuple(letter.decode() for letter in _LETTERS)
+#: Their numbers in `_USUAL`.
+_NUMBERS = range(5, 11)
 _PART = pattern(rb"(?im)^[ \t]*/(PROG|ATTR|APPL|MN|POS|END)\b[^\r\n]*")
 #: A line with its number; a statement ends with the semicolon at the end of a line.
 _LINE = pattern(rb"(?m)^[ \t]*(\d*)[ \t]*:([^\r\n]*?)(;?)[ \t]*\r?$")
 _POSITION = pattern(rb"P\[\s*(\d+)\s*(?::[^\]]*)?\]\s*\{([^{}]*)\}\s*;")
+#: A position in the usual form, as controls write it: of one group, without external axes.
+_STATED = rb"\s*=\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*"
+_USUAL = pattern(
+    rb"P\[\s*(\d+)\s*(?::[^\]]*)?\]\s*\{\s*GP1\s*:\s*UF\s*:\s*(\d+|F)\s*,\s*UT\s*:\s*(\d+|F)\s*,\s*"
+    rb"CONFIG\s*:\s*'([^'{}]*)'\s*,\s*"
+    + rb",\s*".join(
+        name + _STATED + unit + rb"\s*" for name, unit in zip(_LETTERS, _USUAL_UNITS, strict=True)
+    )
+    + rb"\}\s*;"
+)
 _GROUP = pattern(rb"GP(\d+)\s*:")
 _COUNT = pattern(rb"(?im)^[ \t]*LINE_COUNT[ \t]*=[ \t]*(\d+)")
 _NUMBER = rb"([-+]?(?:\d+\.?\d*|\.\d+))"
@@ -55,7 +73,9 @@ class Position:
     def outer(self) -> tuple[float, ...]:
         """The values of the external axes from the first to the last that is stated."""
         stated = {int(name[1:]): value for name, (_, value) in self.axes.items() if name[0] == "E"}
-        return tuple(stated.get(number, ABSENT) for number in range(1, max(stated, default=0) + 1))
+        if not stated:
+            return ()
+        return tuple(stated.get(number, ABSENT) for number in range(1, max(stated) + 1))
 
 
 def parts(data: bytes) -> dict[str, list[Span]]:
@@ -101,29 +121,47 @@ def positions(data: bytes, part: Span, found: dict[int, list[Position]]) -> None
     for match in _POSITION.finditer(data, *part):
         count += data.count(b"\n", place, match.start())
         place = match.start()
-        groups = list(_GROUP.finditer(data, *match.span(2)))
-        bounds = [*(group.start() for group in groups[1:]), match.end(2)][: len(groups)]
-        span, others = (match.span(2) if not groups else (0, 0)), b""
-        for group, end in zip(groups, bounds, strict=True):
-            if group[1] == b"1":
-                span = group.end(), end
-            else:
-                others += data[group.start() : end]
-        frame, config = _FRAME.search(data, *span), _CONFIG.search(data, *span)
-        axes: dict[str, tuple[Span, float]] = {}
-        foreign = ""
-        for axis in _AXIS.finditer(data, *span):
-            letter, stated, unit = axis.groups()
-            name = letter.decode()
-            if stated is not None and abs(value := float(stated)) < LARGEST:
-                axes[name] = axis.span(2), value
-            if unit is not None and not foreign and unit not in _UNITS.get(name, _EITHER):
-                foreign = axis[0].decode("latin-1")
-        used = [-1 if frame is None or frame[k] == b"F" else int(frame[k]) for k in (1, 2)]
+        usual = _USUAL.fullmatch(data, *match.span())
         found.setdefault(int(match[1]), []).append(
-            Position(
-                count, match.span(), match.span(1), used[0], used[1], axes,
-                (span[0], span[0]) if config is None else config.span(1), b"".join(others.split()),
-                foreign,
-            )
-        )  # fmt: skip
+            (usual and _usual(usual, count)) or _position(data, match, count)
+        )
+
+
+def _usual(match: re.Match[bytes], line: int) -> Position | None:
+    """A position in the usual form; None where a number of it is too large to be one."""
+    _, frame, tool, _, *stated = match.groups()
+    values = [float(text) for text in stated]
+    if max(map(abs, values)) >= LARGEST:
+        return None
+    axes = {name: (match.span(k), value) for name, k, value in zip(_AXES, _NUMBERS, values, strict=True)}
+    return Position(
+        line, match.span(), match.span(1), -1 if frame == b"F" else int(frame),
+        -1 if tool == b"F" else int(tool), axes, match.span(4), b"", "",
+    )  # fmt: skip
+
+
+def _position(data: bytes, match: re.Match[bytes], line: int) -> Position:
+    """A position in any form."""
+    groups = list(_GROUP.finditer(data, *match.span(2)))
+    bounds = [*(group.start() for group in groups[1:]), match.end(2)][: len(groups)]
+    span, others = (match.span(2) if not groups else (0, 0)), b""
+    for group, end in zip(groups, bounds, strict=True):
+        if group[1] == b"1":
+            span = group.end(), end
+        else:
+            others += data[group.start() : end]
+    frame, config = _FRAME.search(data, *span), _CONFIG.search(data, *span)
+    axes: dict[str, tuple[Span, float]] = {}
+    foreign = ""
+    for axis in _AXIS.finditer(data, *span):
+        letter, stated, unit = axis.groups()
+        name = letter.decode()
+        if stated is not None and abs(value := float(stated)) < LARGEST:
+            axes[name] = axis.span(2), value
+        if unit is not None and not foreign and unit not in _UNITS.get(name, _EITHER):
+            foreign = axis[0].decode("latin-1")
+    used = [-1 if frame is None or frame[k] == b"F" else int(frame[k]) for k in (1, 2)]
+    return Position(
+        line, match.span(), match.span(1), used[0], used[1], axes,
+        (span[0], span[0]) if config is None else config.span(1), b"".join(others.split()), foreign,
+    )  # fmt: skip
