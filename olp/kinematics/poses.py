@@ -79,10 +79,10 @@ def axis_rotation(direction: Array, angle_rad: Array) -> Array:
     """(n, 3, 3) rotations by angles (n,) about a unit vector (Rodrigues)."""
     x, y, z = direction
     cross = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-    sine = np.sin(angle_rad)[..., None, None]
     # 1 - cos, without cancelling at small angles
-    versine = 2.0 * np.square(np.sin(0.5 * angle_rad))[..., None, None]
-    return np.asarray(np.eye(3) + sine * cross + versine * (cross @ cross))
+    shares = np.stack((np.sin(angle_rad), 2.0 * np.square(np.sin(0.5 * angle_rad))), axis=-1)
+    turned_by = shares @ np.stack((cross.ravel(), (cross @ cross).ravel()))
+    return np.asarray(np.eye(3) + turned_by.reshape(*turned_by.shape[:-1], 3, 3))
 
 
 def tilts(angles_rad: Array, *, reverse: bool = False) -> Array:

@@ -52,6 +52,12 @@ class Moves:
         self.number_count += 1
         return self.number_count - 1
 
+    def numbers(self, spans: Sequence[tuple[int, int]]) -> int:
+        """Numbers of the text, with slots that follow one another; returns the first."""
+        self.lists["spans"].extend(spans)
+        self.number_count += len(spans)
+        return self.number_count - len(spans)
+
     def put(self, **move: Any) -> None:
         """One move."""
         for name, value in move.items():

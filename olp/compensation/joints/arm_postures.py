@@ -62,11 +62,18 @@ class Settled:
         refusals: list[ProgramError] = []
         in_joints = np.isfinite(wanted.joints[:, 0]).tolist()
         begins, line = wanted.begins.tolist(), wanted.line.tolist()
-        for k in range(len(values)):
+        k = 0
+        while k < len(values):
             if begins[k]:
                 last, which, lost = np.full(AXES, np.nan), -1, False
+            numbers = self._on(k, which, begins)
+            if numbers:
+                behind = k + len(numbers)
+                values[k:behind] = _unwrapped(last, self.postures[np.arange(k, behind), numbers])
+                k, last, which, lost = behind, values[behind - 1], numbers[-1], False
+                continue
             try:
-                found, which = (wanted.joints[k], -1) if in_joints[k] else self._of(k, last, which, line[k])
+                found, which = (wanted.joints[k], -1) if in_joints[k] else self._of(k, last, line[k])
                 last = values[k] = found
                 lost = False
             except ProgramError as error:
@@ -74,9 +81,20 @@ class Settled:
                 if not (lost and self._follows(k)):
                     refusals.append(error)
                 last, which, lost = np.full(AXES, np.nan), -1, True
+            k += 1
         if refusals:
             raise ProgramError.together(iter(refusals))
         return values
+
+    def _on(self, k: int, which: int, begins: list[bool]) -> list[int]:
+        """The numbers of the postures of straight moves from `k` on, each near the one before, which is
+        `which`; those that follow one another without a long way."""
+        numbers: list[int] = []
+        while which >= 0 and k < len(begins) and not begins[k] and self.furthest[k][which] <= _FAR_DEG:
+            which = self.next[k][which]
+            numbers.append(which)
+            k += 1
+        return numbers
 
     def _steps(self) -> tuple[list[list[int]], list[list[float]]]:
         """From each posture of the target before (n, 8) the number of the nearest one, and the way of the
@@ -88,9 +106,12 @@ class Settled:
         rows = rows[rows > 0]
         for a in range(0, len(rows), _BATCH):
             some = rows[a : a + _BATCH]
-            away = np.abs(self.postures[some][:, None] - self.postures[some - 1][:, :, None])
-            # both are within half a turn
-            away = np.minimum(away, 360.0 - away).max(axis=3)
+            away = np.zeros((len(some), POSTURES, POSTURES))
+            columns = (np.moveaxis(self.postures[own], 2, 0) for own in (some, some - 1))
+            for after, before in zip(*columns, strict=True):
+                way = np.abs(after[:, None] - before[:, :, None])
+                # both are within half a turn
+                np.maximum(away, np.minimum(way, 360.0 - way), out=away)
             away[np.isnan(away)] = np.inf
             number[some] = np.argmin(away, axis=2)
             size[some] = np.min(away, axis=2)
@@ -100,7 +121,7 @@ class Settled:
         """Whether a target is reached with a posture near the one before."""
         return bool(self.wanted.straight[k] or self.wanted.free[k] or self.wanted.open[k])
 
-    def _of(self, k: int, last: Array, which: int, line: int) -> tuple[Array, int]:
+    def _of(self, k: int, last: Array, line: int) -> tuple[Array, int]:
         """The axis values of a target behind others, and their posture by its number, -1 where it is not
         known."""
         wanted = self.wanted
@@ -108,7 +129,7 @@ class Settled:
             raise _refused("no posture of this arm reaches this target", line)
         known = bool(np.isfinite(last).all())
         if wanted.straight[k] and known:
-            return self._led(k, last, which, line)
+            return self._led(k, last, line)
         if known and (wanted.free[k] or wanted.open[k]):
             found = self._near(k, last, line)
         else:
@@ -119,11 +140,9 @@ class Settled:
             raise straight_wrist(line)
         return found, self._number(k, found)
 
-    def _led(self, k: int, last: Array, which: int, line: int) -> tuple[Array, int]:
-        """The posture at the end of a straight move."""
-        if which >= 0 and self.furthest[k][which] <= _FAR_DEG:
-            number = self.next[k][which]
-            return last + (self.postures[k, number] - last + 180.0) % 360.0 - 180.0, number
+    def _led(self, k: int, last: Array, line: int) -> tuple[Array, int]:
+        """The posture at the end of a straight move that goes a long way, or from a posture whose number is
+        not known."""
         found: Array = nearest(last[None], self.postures[k][None])[0]
         if np.nanmax(np.abs(found - last)) > _FAR_DEG and k:
             found = self._followed(k, last)
@@ -202,6 +221,14 @@ class Settled:
                 line,
             )
         raise _refused("the configuration of this target names several postures", line)
+
+
+def _unwrapped(last: Array, postures: Array) -> Array:
+    """(n, 6) postures one after the other, with the turns by which each is near the one before; the first is
+    near `last` (6,)."""
+    ways = np.diff(postures, axis=0, prepend=last[None])
+    near = last + np.cumsum((ways + 180.0) % 360.0 - 180.0, axis=0)
+    return np.asarray(postures + 360.0 * np.rint((near - postures) / 360.0))
 
 
 def _same(one: Array, other: Array) -> bool:

@@ -40,6 +40,8 @@ _SAME_VECTOR_MM = 1e-4
 _SAME_ORIENTATION = 1e-3
 #: Statements between two reports of progress.
 _TOLD = 4096
+#: Nothing is said of a move.
+_PLAIN = Flag(0)
 _NOWHERE: Vector = (NAN, NAN, NAN)
 _WORDS = pattern(rb"[A-Za-z_]\w*")
 _BEGINS_IN_RUN = "where this move begins depends on the run: it is corrected at its end"
@@ -118,8 +120,8 @@ class RobotMoves:
         outer: tuple[float, ...] = (), copy: Copy = NO_COPY,
     ) -> int:  # fmt: skip
         """Add a target that the text states; returns its place."""
-        first, second, third = (self.moves.number(*span) for span in numbers)
-        slots = (first, second, third)
+        first = self.moves.numbers(numbers)
+        slots = (first, first + 1, first + 2)
         self.targets.append(
             Target(line, value, numbers, slots, point, turn, rest, name, declaration, turned, turns,
                    config, outer, copy=copy)
@@ -161,7 +163,7 @@ class RobotMoves:
             self.remark("told", line, _BEGINS_IN_RUN)
         line_kind = known and not swings
         held = not chord and (whole or (line_kind and target.rest != self._rest))
-        flag = Flag.WHOLE if held else Flag(0)
+        flag = Flag.WHOLE if held else _PLAIN
         kind = Kind.LINE if line_kind else Kind.RAPID
         self.moves.put(
             kind=int(kind), flag=int(flag), line=line, frame=index, end=target.point,
@@ -283,7 +285,7 @@ class RobotMoves:
             self.remark("told", line, _BEGINS_IN_RUN)
         self._frame = self._flange(line)
         self.moves.put(
-            kind=int(Kind.LINE if known else Kind.RAPID), flag=int(Flag(0) if known else Flag.CONTROL),
+            kind=int(Kind.LINE if known else Kind.RAPID), flag=int(_PLAIN if known else Flag.CONTROL),
             line=line, frame=self._frame, end=_NOWHERE, slot=(-1, -1, -1), bounds=NOWHERE,
             feed=feed if known else self._feed,
         )  # fmt: skip
@@ -360,12 +362,14 @@ class RobotMoves:
         )  # fmt: skip
         path = program.toolpath
         path.end_mm[:] = placed_in(frames, path.frame, path.end_mm)
-        own = [
-            replace(target, held=True)
-            if {target.name.upper(), target.name.upper().partition("[")[0]} & self._held
-            else target
-            for target in self.targets
-        ]
+        own = self.targets
+        if self._held:
+            own = [
+                replace(target, held=True)
+                if {target.name.upper(), target.name.upper().partition("[")[0]} & self._held
+                else target
+                for target in own
+            ]
         targets = Targets(tuple(own), tuple(self.uses), tuple(self.arcs), tuple(self.gaps))
         return replace(program, targets=targets)
 

@@ -211,7 +211,7 @@ class _Reader:
 
     def _begin(self, line: Line, move: Manner, number: int) -> None:
         """What counts for all moves. Raises ProgramError for words of them that are not read."""
-        if any(loop and before == self.moves.count for loop, before in self.blocks):
+        if self.blocks and any(loop and before == self.moves.count for loop, before in self.blocks):
             self.moves.known = False
         if move.elsewhere:
             raise not_read(f"this move {move.elsewhere}, which is not read", line.line)
