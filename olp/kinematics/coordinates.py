@@ -1,8 +1,8 @@
 """What words of a program state on a machine: values of its axes, or the pose of its tool.
 
-Where a platform on legs carries the tool, a control computes the axes: X, Y and Z are the tip in machine
-coordinates. Where the platform turns, A, B and C turn the tool from where the gauge holds it, by Rz Ry Rx of
-fixed axes in degrees.
+Where a platform on legs or an arm carries the tool, a control computes the axes: X, Y and Z are the tip in
+machine coordinates. Where all turns are led, A, B and C are Rz Ry Rx of fixed axes in degrees; where one is,
+it has the letter of its axis.
 """
 
 from __future__ import annotations
@@ -10,23 +10,18 @@ from __future__ import annotations
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
-from olp.core.errors import NotInvertible
 from olp.core.units import AXES
 from olp.core.values import dataclass
+from olp.kinematics.branches import family_of
 from olp.kinematics.chain import Kinematics
-from olp.kinematics.poses import Poses, shift, tilts
-from olp.kinematics.structure import FRAME, Joint, Leg, Structure
+from olp.kinematics.poses import Poses, rotation_vector, tilts
+from olp.kinematics.postures import wrapped
+from olp.kinematics.structure import FRAME, Structure
 
 #: The step of words, mm or deg, where no axis states one.
 _UNSTATED = 1e-6
-#: The letters that turn the tool.
+#: The letters that turn the tool about X, Y and Z.
 TURNS = "ABC"
-#: deg; a turn beyond these is stated by another triple of A, B and C, or nearly so.
-FARTHEST_DEG = (179.0, 89.0, 179.0)
-#: A platform within this of its pose is there: mm, and the entries of its rotation.
-_CLOSED = 1e-7
-#: An axis value beyond its travel by less than this is on its end: mm or deg.
-_AT_END = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,15 +42,15 @@ class Coordinates:
 
     @staticmethod
     def of_words(structure: Structure) -> Coordinates:
-        """What words state: poses where a platform carries the tool, else values of the axes."""
-        if not states_poses(structure):
+        """What words state: poses where the control computes the axes, else values of the axes."""
+        turns = stated_turns(structure)
+        if turns is None:
             return Coordinates.of_axes(structure)
-        turns = len(structure.order) - len(AXES)
         lengths = [joint.least_increment for joint in structure.joints.values() if joint.unit == "mm"]
         finest = min((step for step in lengths if step > 0.0), default=_UNSTATED)
-        units = ("mm",) * len(AXES) + ("deg",) * turns
-        steps = (finest,) * len(AXES) + (_UNSTATED,) * turns
-        return Coordinates((*AXES, *TURNS[:turns]), units, steps, poses=True)
+        units = ("mm",) * len(AXES) + ("deg",) * len(turns)
+        steps = (finest,) * len(AXES) + (_UNSTATED,) * len(turns)
+        return Coordinates((*AXES, *turns), units, steps, poses=True)
 
     @property
     def rotary(self) -> Mask:
@@ -67,101 +62,76 @@ class Coordinates:
         """(3,) the columns of X, Y and Z."""
         return np.array([self.names.index(name) for name in AXES])
 
+    def beside(self, found: Array, near: Array) -> Array:
+        """(n, axes) coordinates that state the same as `found`, with turns next to those of `near` (n, axes).
+        Whole turns more state the same pose, and so does another triple of A, B and C."""
+        turns = [self.names.index(name) for name in TURNS if self.poses and name in self.names]
+        if not turns:
+            return found
+        own, wanted = found[:, turns], near[:, turns]
+        triples = [own]
+        if len(turns) == len(TURNS):
+            triples.append(own * (1.0, -1.0, 1.0) + 180.0)
+        away = [wrapped(triple - wanted) for triple in triples]
+        size = [np.abs(part).max(axis=1) for part in away]
+        best = np.where((size[-1] < size[0])[:, None], away[-1], away[0])
+        result = found.copy()
+        # where the near ones are not known, those that were found stay
+        result[:, turns] = np.where(np.isnan(best), own, wanted + best)
+        return result
+
+
+def stated_turns(structure: Structure) -> str | None:
+    """The letters that turn the tool where words state poses, None where they state axis values. A platform
+    alone is led by poses where three axes or six are in its legs, and a serial machine that has a posture."""
+    if structure.platforms or structure.posture is not None:
+        return turns_of(structure)
+    return None
+
+
+def turns_of(structure: Structure) -> str | None:
+    """The same for words that may state poses: of a serial machine also before its posture is known."""
+    if not structure.platforms:
+        family = family_of(structure)
+        return None if family is None else family.turns
+    alone = len(structure.platforms) == 1 and structure.chain == (FRAME, *structure.platforms)
+    return {len(AXES): "", len(AXES) + len(TURNS): TURNS}.get(len(structure.order)) if alone else None
+
 
 def states_poses(structure: Structure) -> bool:
-    """Whether words of a program state poses: on one platform alone, with three axes or six in its legs."""
-    alone = len(structure.platforms) == 1 and structure.chain == (FRAME, *structure.platforms)
-    return alone and len(structure.order) in (len(AXES), len(AXES) + len(TURNS))
+    """Whether words of a program state poses."""
+    return stated_turns(structure) is not None
 
 
 def stated_poses(structure: Structure, values: Array) -> Poses:
-    """(n) poses of the tool that coordinates (n, axes) state, in machine coordinates."""
-    gauge = structure.gauge.pose.rotation
-    if values.shape[1] == len(AXES):
-        return Poses(np.broadcast_to(gauge, (len(values), 3, 3)), values)
-    return Poses(tilts(np.radians(values[:, len(AXES) :])) @ gauge, values[:, : len(AXES)])
+    """(n) poses of the tool that coordinates (n, axes) state, in machine coordinates. What they do not turn
+    is as with all axes at zero."""
+    turns = stated_turns(structure)
+    assert turns is not None
+    angles = np.zeros((len(values), len(TURNS)))
+    angles[:, [TURNS.index(letter) for letter in turns]] = np.radians(values[:, len(AXES) :])
+    return Poses(tilts(angles) @ _reference(structure), values[:, : len(AXES)])
 
 
 def poses_of_axes(machine: Kinematics, values: Array) -> Array:
     """(n, axes) coordinates that state the poses of the nominal machine at axis values (n, axes), NaN where
-    these are unknown."""
+    these are unknown. Turns are within half a turn."""
     stated, known = np.full(values.shape, np.nan), np.isfinite(values).all(axis=1)
-    pose = machine.nominal(values[known])
+    pose, turns = machine.nominal(values[known]), stated_turns(machine.structure)
+    assert turns is not None
     stated[known, : len(AXES)] = pose.position
-    if values.shape[1] == len(AXES):
-        return stated
-    turn = pose.rotation @ machine.structure.gauge.pose.rotation.T
-    a = np.arctan2(turn[:, 2, 1], turn[:, 2, 2])
-    b = np.arctan2(-turn[:, 2, 0], np.hypot(turn[:, 2, 1], turn[:, 2, 2]))
-    c = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
-    stated[known, len(AXES) :] = np.degrees(np.stack((a, b, c), axis=1))
+    turn = pose.rotation @ _reference(machine.structure).T
+    if len(turns) == 1:
+        stated[known, len(AXES)] = np.degrees(rotation_vector(turn)[:, TURNS.index(turns)])
+    elif turns:
+        a = np.arctan2(turn[:, 2, 1], turn[:, 2, 2])
+        b = np.arctan2(-turn[:, 2, 0], np.hypot(turn[:, 2, 1], turn[:, 2, 2]))
+        c = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
+        stated[known, len(AXES) :] = np.degrees(np.stack((a, b, c), axis=1))
     return stated
 
 
-def axes_of_poses(machine: Kinematics, values: Array) -> Array:
-    """(n, axes) axis values of the nominal machine at coordinates (n, axes) that state poses, NaN where these
-    are unknown. Raises NotInvertible with the rows of poses that no legs reach."""
-    structure = machine.structure
-    (platform,) = structure.platforms.values()
-    pose, found = stated_poses(structure, values), np.full(values.shape, np.nan)
-    held = pose @ (structure.gauge.pose @ shift(np.array(machine.tool_mm))).inverse()
-    for leg in platform.legs:
-        name = leg.axis or leg.carriage
-        assert name is not None
-        column = structure.order.index(name)
-        # a second rod of a carriage is parallel to the first
-        if np.isnan(found[:, column]).all():
-            own = np.array(leg.platform_mm)
-            start = np.array(platform.start_mm) + own
-            found[:, column] = _leg_values(structure.joints[name], leg, held.at(own), start)
-    known = np.isfinite(values).all(axis=1)
-    found[~known] = np.nan
-    lost = np.isnan(found).any(axis=1) & known
-    rows = np.flatnonzero(known & ~lost)
-    closed = machine.nominal(found[rows])
-    away = np.abs(closed.position - pose.position[rows]).max(axis=1, initial=0.0)
-    turned = np.abs(closed.rotation - pose.rotation[rows]).max(axis=(1, 2), initial=0.0)
-    lost[rows[np.maximum(away, turned) > _CLOSED]] = True
-    if lost.any():
-        error = NotInvertible(
-            f"row {int(np.argmax(lost))}: the legs of platform {platform.name} do not reach the pose"
-        )
-        error.rows = tuple(np.flatnonzero(lost).tolist())
-        raise error
-    return found
-
-
-def _leg_values(joint: Joint, leg: Leg, end: Array, start: Array) -> Array:
-    """(n,) values of the axis of a leg whose rod ends at points (n, 3), NaN where there is none. Of two
-    within the travel it is the one on the side of axis zero, where the rod ends near `start` (3,)."""
-    base = np.array(leg.base_mm)
-    if leg.carriage is None:
-        return np.asarray(np.linalg.norm(end - base, axis=1) - leg.length_mm)
-    both, at_zero = _both_values(joint, leg, end), _both_values(joint, leg, start[None])[0]
-    low, high = joint.travel
-    # beyond the travel it is the nearer one, so that it can be told
-    beyond = np.maximum(np.maximum(low - both, both - high), _AT_END)
-    beyond = np.where(np.isnan(beyond), np.inf, beyond)
-    side = int(np.argmin(np.where(np.isnan(at_zero), np.inf, np.abs(at_zero))))
-    chosen = np.where(beyond[:, 0] == beyond[:, 1], side, np.argmin(beyond, axis=1))
-    return np.asarray(both[np.arange(len(both)), chosen])
-
-
-def _both_values(joint: Joint, leg: Leg, end: Array) -> Array:
-    """(n, 2) values of a carriage at which its rod has its length, NaN where there are none."""
-    base, direction = np.array(leg.base_mm), np.array(joint.direction)
-    with np.errstate(invalid="ignore"):
-        if joint.kind == "linear":
-            along = (end - base) @ direction
-            off = np.linalg.norm(end - base - along[:, None] * direction, axis=1)
-            half = np.sqrt(leg.length_mm**2 - off**2)
-            return np.stack((along - half, along + half), axis=1)
-        # the base goes round: A cos q + B sin q = K
-        arm, far = base - np.array(joint.point_mm), end - np.array(joint.point_mm)
-        axial = (arm @ direction) * direction
-        first, second = far @ (arm - axial), far @ np.cross(direction, arm)
-        size = 0.5 * (arm @ arm + (far * far).sum(axis=1) - leg.length_mm**2) - far @ axial
-        along = np.arctan2(second, first)
-        half = np.arccos(size / np.hypot(first, second))
-    both = np.degrees(np.stack((along - half, along + half), axis=1))
-    return np.asarray((both + 180.0) % 360.0 - 180.0)
+def _reference(structure: Structure) -> Array:
+    """(3, 3) the rotation of the tool that is stated as no turn: that of the gauge on a platform."""
+    family = None if structure.posture is None else family_of(structure)
+    return structure.gauge.pose.rotation if family is None else family.reference

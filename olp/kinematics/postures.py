@@ -159,19 +159,15 @@ class Arm:
         alone whose third is next to `near`."""
         side = self.direction[1]
         lower, upper = self.point[2] - self.point[1], end - self.point[2]
-        reach = place - self.point[1]
-        lower, upper, reach = (v - (v @ side)[..., None] * side for v in (lower, upper, reach))
-        want = (np.sum(reach * reach, axis=1) - lower @ lower - upper @ upper) / 2.0
         # the third axis may run against the second
         sense = float(self.direction[2] @ side)
-        bends: Sequence[tuple[Array, ...]] = [
-            (angle, angle * sense) for angle in met(lower @ upper, lower @ np.cross(side, upper), want)
-        ]
-        pairs = []
-        for angle, third in bends if near is None else [nearer(bends, near, 1)]:
-            tip = lower + turned(axis_rotation(side, angle), upper)
-            pairs.append((angle_about(side, tip, reach), third))
-        return pairs
+
+        def bends(choices: Choices) -> Choices:
+            own = [(angle * sense,) for (angle,) in choices]
+            return [(angle * sense,) for (angle,) in pick(own)]
+
+        pairs = two_turns(side, lower, upper, place - self.point[1], bends)
+        return [(second, third * sense) for second, third in pairs]
 
     def _wrist(self, rest: Array, near: Array | None = None) -> list[tuple[Array, Array, Array]]:
         """(n,) angles of the last three axes, whose rotation is `rest` (n, 3, 3); those alone whose fifth is
@@ -192,6 +188,18 @@ class Arm:
             last = angle_about(sixth, beside, turned(left, beside))
             found.append((turn, angle, last))
         return found
+
+
+def two_turns(axis: Array, lower: Array, upper: Array, reach: Array) -> list[tuple[Array, Array]]:
+    """(n,) both pairs of angles about `axis` (3,) by which two links (3,), one behind the other, end at
+    vectors `reach` (n, 3) across the axis; NaN where there are none."""
+    lower, upper, reach = (v - (v @ axis)[..., None] * axis for v in (lower, upper, reach))
+    want = (np.sum(reach * reach, axis=1) - lower @ lower - upper @ upper) / 2.0
+    pairs = []
+    for angle in met(lower @ upper, lower @ np.cross(axis, upper), want):
+        tip = lower + turned(axis_rotation(axis, angle), upper)
+        pairs.append((angle_about(axis, tip, reach), angle))
+    return pairs
 
 
 def rotary_lines(structure: Structure) -> tuple[Array, Array, Index] | None:

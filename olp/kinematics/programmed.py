@@ -2,7 +2,7 @@
 
 In axis words the numbers are axis values. With tool centre point control the linear ones state the tip in the
 workpiece, as the axis values that would bring a tool without length there with all rotary axes at zero. Where
-a platform carries the tool, all of them state its pose (`olp.kinematics.coordinates`).
+the control computes all axes, they state the pose of the tool (`olp.kinematics.coordinates`).
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO
+from olp.core.units import AXES
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.columns import cross, dot, triple
-from olp.kinematics.coordinates import axes_of_poses, poses_of_axes, stated_poses, states_poses
+from olp.kinematics.coordinates import poses_of_axes, stated_poses, stated_turns, states_poses
+from olp.kinematics.pose_axes import axes_of_poses
 from olp.kinematics.poses import Poses
 from olp.kinematics.structure import Structure
 
@@ -60,15 +62,20 @@ def axes_of_tips(machine: Kinematics, values: Array) -> Array:
 def stated_tips(machine: Kinematics, values: Array) -> Array:
     """(n, 3) tips in workpiece coordinates of programmed coordinates (n, axes), which state the tip."""
     if states_poses(machine.structure):
-        return stated_poses(machine.structure, values).position
+        return values[:, : len(AXES)]
     origin, slopes = _workpiece(machine)
     return np.asarray(origin + values[:, linear_columns(machine.structure)] @ slopes.T)
 
 
 def stated_targets(machine: Kinematics, values: Array) -> Poses:
-    """(n) poses of the nominal tool at programmed coordinates (n, axes), which state the tip."""
-    if states_poses(machine.structure):
-        return stated_poses(machine.structure, values)
+    """(n) poses of the nominal tool at programmed coordinates (n, axes), which state the tip. Raises
+    NotInvertible with rows whose poses are out of reach."""
+    structure = machine.structure
+    if states_poses(structure):
+        if stated_turns(structure) or structure.platforms:
+            return stated_poses(structure, values)
+        # the axes that bring the tip there turn the tool besides
+        return Poses(machine.nominal(axes_of_poses(machine, values)).rotation, stated_tips(machine, values))
     return Poses(machine.nominal(values).rotation, stated_tips(machine, values))
 
 

@@ -87,6 +87,7 @@ class Gauge:
 class Structure:
     """A machine of any joints. `chain` names joints and platforms from workpiece to tool, with `F` for the
     frame; `joints` are all axes, also those of legs and carriages, in the order of columns of axis values.
+    Where words of programs state poses of serial axes, `posture` are axis values in the branch they mean.
 
     Raises ConfigError where the parts do not fit each other.
     """
@@ -98,6 +99,7 @@ class Structure:
     gauge: Gauge = Gauge()
     gravity: Vector = (0.0, 0.0, -1.0)
     symmetric_tool: bool = True
+    posture: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         problems = structure_problems(self.chain, self.joints, self.platforms)

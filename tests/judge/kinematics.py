@@ -73,14 +73,21 @@ def forward(name: str, pins: Mapping[str, float], joints: np.ndarray) -> np.ndar
     return np.array(poses)
 
 
-def inverse(name: str, pins: Mapping[str, float], poses: np.ndarray, count: int) -> np.ndarray:
-    """(n, count) joint values of a module at poses (n, 6) x y z a b c, with the pins set."""
+def inverse(
+    name: str, pins: Mapping[str, float], poses: np.ndarray, count: int, near: np.ndarray | None = None
+) -> np.ndarray:
+    """(n, count) joint values of a module at poses (n, 6) x y z a b c, with the pins set. It starts `near`
+    (count,) joint values, whose branch it takes from its own forward computation there."""
     module = _module(name)
     _set(name, pins)
-    rows = []
+    rows, start = [], [0.0] * count if near is None else list(map(float, near))
+    flags = (ctypes.c_ulong(0), ctypes.c_ulong(0))
+    values = (ctypes.c_double * _JOINTS)(*start)
+    if near is not None:
+        assert module.kinematicsForward(values, ctypes.byref(_Pose()), *map(ctypes.byref, flags)) == 0
     for row in poses:
-        values, pose = (ctypes.c_double * _JOINTS)(), _Pose(*map(float, row))
-        flags = (ctypes.c_ulong(0), ctypes.c_ulong(0))
-        assert module.kinematicsInverse(ctypes.byref(pose), values, *map(ctypes.byref, flags)) == 0
+        values, pose = (ctypes.c_double * _JOINTS)(*start), _Pose(*map(float, row))
+        both = ctypes.byref(flags[1]), ctypes.byref(flags[0])
+        assert module.kinematicsInverse(ctypes.byref(pose), values, *both) == 0
         rows.append(list(values)[:count])
     return np.array(rows)

@@ -9,8 +9,8 @@ import pytest
 from judge import kinematics as judge
 
 from olp.kinematics.chain import Kinematics
-from olp.kinematics.coordinates import axes_of_poses
 from olp.kinematics.inverse import inverse
+from olp.kinematics.pose_axes import axes_of_poses
 from olp.kinematics.poses import STILL, Poses, axis_rotation, shift
 from olp.kinematics.structure import Gauge, Joint, Leg, Platform, Structure
 
@@ -107,6 +107,29 @@ def test_arms() -> None:
     assert np.abs(ours[away] - again).max() < AGREES
 
 
+def test_arms_that_are_led_by_poses() -> None:
+    quarter = np.pi / 2
+    rows = [(0.0, 0.0, 0.0), (0.0, -quarter, 0.0), (300.0, 0.0, 70.0)]
+    rows += [(50.0, -quarter, 400.0), (0.0, quarter, 0.0), (0.0, -quarter, 60.0)]
+    pins = {"A2": 300.0, "A3": 50.0, "D3": 70.0, "D4": 400.0, "D6": 60.0}
+    arm = arm_of(rows)
+    for posture in ((10.0, -60.0, 30.0, 20.0, 50.0, 5.0), (160.0, 40.0, -170.0, 20.0, -50.0, 5.0)):
+        machine = Kinematics(replace(arm, posture=posture))
+        values = np.array(posture) + RNG.uniform(-9.0, 9.0, (20, 6))
+        words = judge.forward("pumakins", pins, values)
+        assert np.abs(axes_of_poses(machine, words) - values).max() < AGREES
+        theirs = judge.inverse("pumakins", pins, words, 6, np.array(posture))
+        assert np.abs((theirs - values + 180.0) % 360.0 - 180.0).max() < AGREES
+
+
+def test_polar_machines_that_are_led_by_poses() -> None:
+    joints = {"R": joint("R", "linear", X), "Z": joint("Z", "linear", Z), "C": joint("C", "rotary", Z)}
+    machine = Kinematics(Structure("m", ("C", "F", "Z", "R"), joints, posture=(9.0, 0.0, 180.0)))
+    values = RNG.uniform((10.0, -50.0, 0.0), (300.0, 50.0, 360.0), (40, 3))
+    words = judge.forward("rosekins", {}, values)[:, :3]
+    assert np.abs(axes_of_poses(machine, words) - values).max() < AGREES
+
+
 def test_scara() -> None:
     joints = {"J1": joint("J1", "rotary", Z), "J2": joint("J2", "rotary", Z, (340.0, 0.0, 0.0))}
     joints["J3"] = joint("J3", "linear", back(Z))
@@ -116,6 +139,13 @@ def test_scara() -> None:
     pins = {"D1": 490.0, "D2": 340.0, "D3": 0.0, "D4": 250.0, "D5": 0.0, "D6": 50.0}
     theirs = judge.forward("scarakins", pins, values)
     assert np.abs(Kinematics(structure).nominal(values).position - theirs[:, :3]).max() < AGREES
+    for posture, side in (((0.0, 90.0, 0.0, 0.0), 1.0), ((0.0, -90.0, 0.0, 0.0), -1.0)):
+        values[:, 1] = side * np.abs(values[:, 1])
+        words = judge.forward("scarakins", pins, values)[:, [0, 1, 2, 5]]
+        assert (
+            np.abs(axes_of_poses(Kinematics(replace(structure, posture=posture)), words) - values).max()
+            < AGREES
+        )
 
 
 def lengths_of(bases: list[Vector], ends: list[Vector], start: Vector, *, turns: bool) -> Structure:

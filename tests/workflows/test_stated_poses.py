@@ -136,7 +136,7 @@ def test_a_machine_without_errors_changes_nothing(kind: str, tmp_path: Path) -> 
     ("blocks", "why"),
     [
         ("G1 X1900. F100\n", "out of its travel 50 to 1500"),
-        ("G1 B95. F100\n", "beyond 179, 89, 179 deg"),
+        ("G1 B95. F100\n", "B turns the tool to within 1 deg of a right angle"),
         ("G81 X1. Z420 R425 F100\nG80\n", "--expand-cycles"),
         ("G92 X0\n", "stores the present position"),
     ],

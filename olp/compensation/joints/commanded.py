@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.compensation.joints.path import JointPath, unreached
+from olp.compensation.joints.path import JointPath
+from olp.compensation.joints.posed import unreached
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import NotInvertible, ProgramError
 from olp.core.values import dataclass
@@ -77,10 +78,7 @@ def led(path: JointPath, begin: Rows, end: Rows, owner: Index, part: Array) -> A
     are those of its end."""
     motion, move = path.motion, end.move[owner]
     lead = 0.5 * motion.width * end.side
-    ends = [
-        motion.programmed(rows.axes + lead, path.tool[rows.move], path.tip[rows.move])
-        for rows in (begin, end)
-    ]
+    ends = [path.commanded(rows.move, rows.share, rows.axes + lead) for rows in (begin, end)]
     written = path.between(ends[0][owner], ends[1][owner], part, move)
     return np.asarray(motion.axes(written, path.tool[move], path.tip[move]) - lead[owner])
 

@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.joints.directed import refuse_near
-from olp.compensation.joints.path import JointPath, unreached
+from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
+from olp.compensation.joints.posed import unreached
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import NotInvertible, ProgramError
 from olp.core.values import dataclass

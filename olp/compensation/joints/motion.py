@@ -22,6 +22,7 @@ from olp.kinematics.correction import (
     meet_positions,
 )
 from olp.kinematics.errors import MachineErrors
+from olp.kinematics.pose_axes import stated_mobility
 from olp.kinematics.poses import Poses
 from olp.kinematics.programmed import axes_of_tips, stated_targets, stated_tips, tips_of_axes
 from olp.kinematics.structure import Structure
@@ -183,6 +184,13 @@ class Motion:
         for machine, rows in self._groups(tool):
             slopes[rows] = machine.jacobian(axes[rows])
         return slopes
+
+    def stated_mobility(self, axes: Array, tool: Index) -> Array:
+        """(n,) as `stated_mobility`."""
+        found = np.empty(len(axes))
+        for machine, rows in self._groups(tool):
+            found[rows] = stated_mobility(machine, axes[rows])
+        return found
 
     def _groups(self, tool: Index) -> Iterator[tuple[Kinematics, Rows]]:
         """The machine with each tool, and its rows."""

@@ -12,6 +12,7 @@ from olp.compensation.joints.curves import Curves
 from olp.compensation.joints.directed import Directions
 from olp.compensation.joints.drilled import Drilled
 from olp.compensation.joints.motion import Motion
+from olp.compensation.joints.posed import refuse_poses, unreached
 from olp.compensation.joints.refused import KEPT, refuse_tips, refuse_unread
 from olp.compensation.joints.sampling import Resolution
 from olp.compensation.joints.tilts import (
@@ -29,7 +30,7 @@ from olp.core.toolpath import Flag, Kind, Toolpath, Touch
 from olp.core.turns import turned
 from olp.core.units import AXES
 from olp.core.values import dataclass
-from olp.kinematics.coordinates import FARTHEST_DEG, Coordinates
+from olp.kinematics.coordinates import Coordinates
 from olp.kinematics.errors import MachineErrors
 from olp.kinematics.structure import Structure
 from olp.program.pointlist.axis_list import AxisList
@@ -102,6 +103,11 @@ class JointPath:
             alone = np.ix_(~known, self.coordinates.rotary)
             axes[alone] = programmed[alone]
         return axes
+
+    def commanded(self, move: Index, share: Array, axes: Array) -> Array:
+        """(r, axes) coordinates that state axis values at shares of moves, next to the programmed ones."""
+        found = self.motion.programmed(axes, self.tool[move], self.tip[move])
+        return self.coordinates.beside(found, self.at(move, share)) if self.coordinates.poses else found
 
     def between(self, start: Array, end: Array, share: Array, move: Index) -> Array:
         """(r, axes) coordinates at shares of ways from `start` to `end`, led as in moves. Raises ProgramError
@@ -186,12 +192,12 @@ class JointPath:
         pairs = zip(path.frames, offsets, strict=True)
         shifts = [_shift(structure, errors, frame.touched, row, words) for frame, row in pairs]
         tool = tool_of[path.frame]
-        _refuse_poses(program, words, motion, end, tool, holes)
+        refuse_poses(program, words, motion, end, tool, holes)
         kept = (path.flag & KEPT) != 0
         arc = np.zeros(len(path), bool)
         arc[path.arcs.move] = True
         feed = ((path.kind == Kind.LINE) | arc) & ~kept
-        start = _starts(motion, end, tool, tip, np.array(path.start_mm), columns, start_deg, order)
+        start = _starts(motion, words, end, tool, tip, np.array(path.start_mm), start_deg)
         refuse_off_normal(program, structure, fixed, feed, start, end)
         curves = Curves.of_program(program, start, end, columns, kept)
         stay = stands_before(fixed | holes.whole, feed, degrees)
@@ -234,55 +240,6 @@ class JointPath:
         )  # fmt: skip
 
 
-def _refuse_poses(
-    program: Program, words: Coordinates, motion: Motion, end: Array, tool: Index, holes: Drilled
-) -> None:
-    """Where words state poses, raise ProgramError for those that legs do not reach, turns that are nearly
-    stated by other numbers, and cycles."""
-    if not words.poses:
-        return
-    line = program.toolpath.line
-    if holes.strokes.any():
-        raise ProgramError(
-            "where words state poses this is not corrected: a canned cycle; give --expand-cycles, which "
-            "writes it out as moves",
-            line=int(line[holes.strokes].min()),
-            code="OLP565",
-        )
-    turns = np.abs(end[:, len(AXES) :])
-    far = (turns > FARTHEST_DEG[: turns.shape[1]]).any(axis=1)
-    if far.any():
-        most = ", ".join(f"{most:g}" for most in FARTHEST_DEG)
-        raise ProgramError(
-            f"A, B or C turns the tool beyond {most} deg, where other numbers state nearly the same turn; "
-            "clamp the part in another way",
-            line=int(line[np.argmax(far)]),
-            code="OLP565",
-        )
-    try:
-        motion.axes(end, tool, np.ones(len(end), bool))
-    except NotInvertible as error:
-        raise ProgramError.together(
-            ProgramError(
-                "no axis values bring the tool to this pose; expected one within reach, with the work offset "
-                "and the tool of the machine file",
-                line=int(line[row]),
-                code="OLP566",
-            )
-            for row in error.rows
-        ) from None
-
-
-def unreached(line: int) -> ProgramError:
-    """Why a move is refused along which directions of the tool are not reached."""
-    return ProgramError(
-        "along this move the tool has places or directions that no axis values near by give; split it, or "
-        "lead it by the axes",
-        line=line,
-        code="OLP566",
-    )
-
-
 def _places(words: Coordinates) -> Index:
     """(axes,) the fewest decimals of words: those of the least increments, where they are stated."""
     return np.array(
@@ -291,14 +248,14 @@ def _places(words: Coordinates) -> Index:
 
 
 def _starts(
-    motion: Motion, end: Array, tool: Index, tip: Mask, start_mm: Array, columns: list[int],
-    start_deg: Mapping[str, float], order: tuple[str, ...],
+    motion: Motion, words: Coordinates, end: Array, tool: Index, tip: Mask, start_mm: Array,
+    start_deg: Mapping[str, float],
 ) -> Array:  # fmt: skip
     """(n, axes) coordinates at the start of each move, in the mode and with the tool of the move itself."""
     if not len(end):
         return end
-    first = np.array([start_deg.get(name, np.nan) for name in order])
-    first[columns] = start_mm
+    first = np.array([start_deg.get(name, np.nan) for name in words.names])
+    first[words.linear] = start_mm
     start = np.vstack((first, end[:-1]))
     before_tip, before_tool = np.append(False, tip[:-1]), np.append(tool[:1], tool[:-1])
     start[:1] = motion.programmed(start[:1], tool[:1], before_tip[:1])
@@ -307,7 +264,8 @@ def _starts(
     changed = np.flatnonzero((before_tip != tip) | other)
     changed = changed[np.isfinite(start[changed]).all(axis=1)]
     axes = motion.axes(start[changed], before_tool[changed], before_tip[changed])
-    start[changed] = motion.programmed(axes, tool[changed], tip[changed])
+    stated = motion.programmed(axes, tool[changed], tip[changed])
+    start[changed] = words.beside(stated, start[changed])
     return np.asarray(start)
 
 

@@ -237,7 +237,7 @@ def _finished(path: JointPath, rows: Rows, straight: bool) -> JointPlan:
     if motion.width.any():
         # a drive leads its load
         refuse_beyond(path, rows.move, axes, beyond_travel(motion.structure, axes))
-    command = motion.programmed(axes, path.tool[rows.move], path.tip[rows.move])
+    command = path.commanded(rows.move, rows.share, axes)
     blank = np.full((len(still), path.end.shape[1]), np.nan)
     move, share = np.append(rows.move, still), np.append(rows.share, np.ones(len(still)))
     order = np.lexsort((share, move))

@@ -20,9 +20,10 @@ from olp.files.kinematics.schema import (
 from olp.files.problems import config_error, validate
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, Reader, read_bytes
-from olp.kinematics.coordinates import Coordinates, states_poses
+from olp.kinematics.coordinates import Coordinates
 from olp.kinematics.machine import JointMachine
 from olp.kinematics.parallel_arm import arm_of
+from olp.kinematics.pose_axes import posed
 from olp.kinematics.structure import Gauge, Joint, Leg, Platform, Structure
 
 
@@ -50,6 +51,7 @@ def load_joint_machine(path: PathLike, read: Reader = read_bytes) -> JointMachin
     symmetric = len(slides) >= len(OWN_DIRECTIONS) if symmetry is None else symmetry == "axis"
     try:
         structure = Structure(file.name, chain, joints, platforms, gauge, gravity, symmetric)
+        structure = posed(structure, file.kinematics.program_words == "pose", file.kinematics.posture)
     except ConfigError as error:
         raise config_error([(None, problem) for problem in error.problems], str(path)) from None
     default = file.job_defaults.tool
@@ -88,12 +90,6 @@ def _control(file: JointMachineFile, structure: Structure, path: PathLike) -> Ma
     kinds = {name: joint.kind for name, joint in structure.joints.items()}
     linear = {name for name, kind in kinds.items() if kind == "linear"}
     if file.kinematics.program_words == "pose":
-        if not states_poses(structure):
-            raise config_error(
-                [(None, 'kinematics.program_words = "pose" is read where one platform carries the tool, '
-                        f"with all axes in its legs; the chain is {' '.join(structure.chain)}")],
-                str(path),
-            )  # fmt: skip
         x, y, z = Coordinates.of_words(structure).steps[: len(AXES)]
         axes = {name: Axis((-np.inf, np.inf), step) for name, step in zip(AXES, (x, y, z), strict=True)}
     elif structure.platforms or linear != set(AXES) or not kinds.keys() - linear <= set(ROTARY_NAMES):

@@ -161,9 +161,16 @@ class KinematicsTable(Table):
     )
     program_words: Literal["pose"] | None = Field(
         default=None,
-        description='"pose" where the control of a platform on legs computes the axes: X, Y and Z of '
-        "programs are the tip in machine coordinates. A, B and C of a platform that turns are then Rz Ry Rx "
-        "of fixed axes from the gauge as it is stated. If left out, lists of axis values are read alone",
+        description='"pose" where the control computes the axes of a platform on legs, or of a SCARA, polar '
+        "or six-axis arm: X, Y and Z of programs are the tip in machine coordinates. A, B and C are Rz Ry Rx "
+        "of fixed axes: on a platform that turns from the gauge as it is stated, on an arm of the frame of "
+        "the gauge. A SCARA has one of them, from all axes at zero. If left out, axis values are read alone",
+    )
+    posture: dict[Text, float] | None = Field(
+        default=None,
+        description='with program_words = "pose" on serial axes: the values of all axes, in mm and deg, in '
+        "one posture of the branch that the control takes. Such as { J1 = 0.0, J2 = 90.0, J3 = 0.0 }; rotary "
+        "axes stay within half a turn of it",
     )
     swivel_axis: Text | None = Field(
         default=None,

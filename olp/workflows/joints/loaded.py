@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from olp.compensation.joints.arm_path import ArmPath, arm_path
+from olp.compensation.joints.branch_ways import follow
 from olp.compensation.joints.path import JointPath
 from olp.core.errors import ConfigError, ProgramError, UsageError
 from olp.core.machine import ZERO, Job, Setup, WorkOffset
@@ -20,7 +21,7 @@ from olp.files.config import load_job
 from olp.files.kinematics.load import load_joint_errors
 from olp.files.kinematics.machine import load_joint_machine
 from olp.files.sources import Source, Sources
-from olp.kinematics.coordinates import Coordinates, states_poses
+from olp.kinematics.coordinates import Coordinates, states_poses, turns_of
 from olp.kinematics.errors import MachineErrors, Payload
 from olp.kinematics.machine import JointCalibration, JointMachine
 from olp.program.dialect import Dialect
@@ -112,7 +113,7 @@ class JointRun:
                 return own
         if self.setup is None:
             how = ""
-            if states_poses(self.machine.structure):
+            if turns_of(self.machine.structure) is not None:
                 how = ', or program_words = "pose" in [kinematics] where X, Y and Z of programs are the tip'
             if self.job.dialect not in (None, AXIS_LIST.name) or not _names_axes(source.data, self.machine):
                 raise ProgramError(
@@ -187,12 +188,14 @@ class JointRun:
     def _path(self, program: Program, setup: Setup) -> JointPath:
         """The path of a program that was read with its words."""
         from_zero = self.machine.tips_from_zero
-        return JointPath.of(
+        path = JointPath.of(
             program, self.machine.structure, self.errors, setup.machine,
             rotated=self.turned, start_deg=self.job.start_deg,
             tips_from_zero=program.dialect.tips_from_zero if from_zero is None else from_zero,
             swivel_axis=self.machine.swivel_axis,
         )  # fmt: skip
+        follow(path)
+        return path
 
     def _arm_setup(self) -> Setup:
         """What a reader of robot programs sees."""
