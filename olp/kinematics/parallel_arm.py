@@ -10,10 +10,12 @@ from olp.kinematics.postures import (
     AXES,
     POSTURES,
     Arm,
+    Choose,
+    Pick,
     angle_about,
+    both,
     meeting,
     met,
-    nearer,
     rotary_lines,
     wrapped,
 )
@@ -64,16 +66,17 @@ class ParallelArm(Arm):
         values[:, :, self.columns] = wrapped(np.degrees(result))
         return values
 
-    def near(self, flange: Poses, axes: Array) -> Array:
+    def _chosen(self, flange: Poses, choose: Choose) -> Array:
         """As that of other arms."""
         motion = flange @ self.flange.inverse()
-        own = np.radians(axes[:, self.columns])
+        values = np.empty((len(motion.position), AXES))
         with np.errstate(invalid="ignore", divide="ignore"):
-            (first,) = nearer([(angle,) for angle in self._first(motion.at(self.wrist))], own[:, 0])
+            first = choose(self._first(motion.at(self.wrist)), 0)
             rest = self._behind(motion, first)
-            fifth, sixth = nearer(self._wrist_pair(rest.rotation), own[:, 4])
-            middle = nearer(self._middle(rest, fifth, sixth), own[:, 2], 1)
-        return self._beside(axes, (first, *middle, fifth, sixth))
+            ((fifth, sixth),) = self._wrist_pair(rest.rotation, lambda of: [choose(of, 4)])
+            (middle,) = self._middle(rest, fifth, sixth, lambda of: [choose(of, 2)])
+        values[:, self.columns] = np.degrees(np.stack((first, *middle, fifth, sixth), axis=1))
+        return values
 
     def _behind(self, motion: Poses, first: Array) -> Poses:
         """What the axes behind the first do of a motion."""
@@ -100,21 +103,24 @@ class ParallelArm(Arm):
         reach = (self.point[1] - self.point[0] + lower + upper + hand) @ ahead
         return np.stack((reach, before, bend, bend), axis=1).reshape(*shape, 4)
 
-    def _wrist_pair(self, rest: Array) -> list[tuple[Array, Array]]:
-        """(n,) angles of the last two axes, where the rotation behind the first is `rest` (n, 3, 3)."""
+    def _wrist_pair(self, rest: Array, pick: Pick = both) -> list[tuple[Array, Array]]:
+        """(n,) angles of the last two axes, for those of the fifth that are picked. The rotation behind the
+        first is `rest` (n, 3, 3)."""
         side, fifth, sixth = self.direction[[1, 4, 5]]
         inner = fifth * (fifth @ sixth)
         want = turned(rest, np.broadcast_to(sixth, (len(rest), 3))) @ side - side @ inner
         across = np.swapaxes(rest, -1, -2) @ side
         found = []
-        for angle in met(side @ (sixth - inner), side @ np.cross(fifth, sixth), want):
+        for angle in pick(met(side @ (sixth - inner), side @ np.cross(fifth, sixth), want)):
             along = self._turn(4, -angle) @ side
             straight = np.linalg.norm(np.cross(along, sixth), axis=1) < _STRAIGHT
             found.append((angle, np.where(straight, np.nan, angle_about(sixth, across, along))))
         return found
 
-    def _middle(self, rest: Poses, fifth: Array, sixth: Array) -> list[tuple[Array, Array, Array]]:
-        """(n,) angles of the three parallel axes."""
+    def _middle(
+        self, rest: Poses, fifth: Array, sixth: Array, pick: Pick = both
+    ) -> list[tuple[Array, Array, Array]]:
+        """(n,) angles of the three parallel axes, for those of the third that are picked."""
         side, back = self.direction[1], [self._turn(4, -fifth), self._turn(5, -sixth)]
         beside = np.cross(side, np.eye(3)[int(np.argmin(np.abs(side)))])
         whole = angle_about(
@@ -125,7 +131,7 @@ class ParallelArm(Arm):
             place = point + turned(turn, np.broadcast_to(place - point, (len(fifth), 3)))
         place = rest.position + turned(rest.rotation, place)
         found = []
-        for second, third in self._lower_arm(place, self.point[3]):
+        for second, third in self._lower_arm(place, self.point[3], pick):
             about = third * float(self.direction[2] @ side)
             found.append((second, third, (whole - second - about) * float(self.direction[3] @ side)))
         return found

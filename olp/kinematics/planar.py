@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from olp.core.arrays import Array
+from olp.core.machine import Vector
 from olp.core.units import AXES
 from olp.core.values import dataclass
-from olp.kinematics.chain import Kinematics
 from olp.kinematics.poses import axis_rotation, shift, turned
 from olp.kinematics.postures import angle_about, two_turns, wrapped
 from olp.kinematics.structure import FRAME, Joint, Structure
@@ -33,6 +33,7 @@ class PlanarChain:
     along: Joint
     wrist: Joint | None
     turns: str
+    branches: int = 2
 
     @staticmethod
     def of(structure: Structure) -> PlanarChain | None:
@@ -69,34 +70,31 @@ class PlanarChain:
         """(3, 3) the rotation of the tool where its turn is stated as zero."""
         return self.structure.gauge.pose.rotation
 
-    def postures(self, machine: Kinematics, words: Array) -> Array:
-        """(n, 2, axes) axis values that bring the tip to words (n, axes), which are X, Y, Z and the turn; NaN
-        where there are none. Axes of the pair are within half a turn of the posture of the structure. The
-        wrist counts from there: the words state its whole turns."""
+    def axes(self, words: Array, tool_mm: Vector, branch: int) -> Array:
+        """(n, axes) axis values in a branch that bring the tip to words (n, axes), which are X, Y, Z and the
+        turn; NaN where there are none. Axes of the pair are within half a turn of the posture of the
+        structure. The wrist counts from there: the words state its whole turns."""
         structure, normal = self.structure, self.normal
-        tip = (structure.gauge.pose @ shift(np.array(machine.tool_mm))).position
+        tip = (structure.gauge.pose @ shift(np.array(tool_mm))).position
         place, end = words[:, : len(AXES)], tip
-        values = np.full((len(words), 2, len(structure.order)), np.nan)
+        values = np.full((len(words), len(structure.order)), np.nan)
         own = np.array(self.along.direction) @ normal
-        values[:, :, structure.order.index(self.along.name)] = (((place - tip) @ normal) / own)[:, None]
+        values[:, structure.order.index(self.along.name)] = ((place - tip) @ normal) / own
         turn = np.zeros(len(words))
         if self.wrist is not None:
             axis = np.eye(len(AXES))[_LETTERS.index(self.turns)]
             turn, end = words[:, len(AXES)] * (axis @ normal), np.array(self.wrist.point_mm)
             place = place - turned(axis_rotation(normal, np.radians(turn)), tip - end)
         with np.errstate(invalid="ignore"):
-            branches = self._pair(place, end)
-        for number, both in enumerate(branches):
-            left = turn
-            for joint, value in zip(self.pair, both, strict=True):
-                column = structure.order.index(joint.name)
-                values[:, number, column] = found = self._own(joint, column, value)
-                if joint.kind == "rotary":
-                    left = left - found * (np.array(joint.direction) @ normal)
-            if self.wrist is not None:
-                sign = np.array(self.wrist.direction) @ normal
-                values[:, number, structure.order.index(self.wrist.name)] = left / sign
-        values[np.isnan(values).any(axis=2)] = np.nan
+            both = self._pair(place, end)[branch]
+        for joint, value in zip(self.pair, both, strict=True):
+            column = structure.order.index(joint.name)
+            values[:, column] = found = self._own(joint, column, value)
+            if joint.kind == "rotary":
+                turn = turn - found * (np.array(joint.direction) @ normal)
+        if self.wrist is not None:
+            sign = np.array(self.wrist.direction) @ normal
+            values[:, structure.order.index(self.wrist.name)] = turn / sign
         return values
 
     def _own(self, joint: Joint, column: int, value: Array) -> Array:

@@ -3,6 +3,7 @@ those in one branch of serial axes."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -10,11 +11,13 @@ import numpy as np
 
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError, NotInvertible
+from olp.core.machine import Vector
 from olp.core.units import AXES
-from olp.kinematics.branches import branch_of, family_of
+from olp.kinematics.branches import REMEMBERED, Family, family_of
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.coordinates import TURNS, poses_of_axes, stated_poses, stated_turns, states_poses
 from olp.kinematics.poses import shift
+from olp.kinematics.postures import wrapped
 from olp.kinematics.structure import REFERENCE_RADIUS_MM, Joint, Leg, Structure
 
 #: Below this `stated_mobility` a posture is singular: 1 deg of an elbow, 1.5 mm of a radius.
@@ -85,11 +88,10 @@ def _of_branch(machine: Kinematics, values: Array) -> Array:
     """The axis values in the branch of the posture."""
     family = family_of(machine.structure)
     assert family is not None
-    near = np.array([machine.structure.posture], float)
-    found = family.postures(machine, values)[:, branch_of(family, machine, poses_of_axes(machine, near))]
+    found = family.axes(values, machine.tool_mm, _branch(family, machine.tool_mm))
     known = np.isfinite(values).all(axis=1)
-    found[~known] = np.nan
     lost = known & np.isnan(found).any(axis=1)
+    found[~known] = np.nan
     if lost.any():
         error = NotInvertible(
             f"row {int(np.argmax(lost))}: no axis values in the branch of kinematics.posture reach the pose"
@@ -97,6 +99,18 @@ def _of_branch(machine: Kinematics, values: Array) -> Array:
         error.rows = tuple(np.flatnonzero(lost).tolist())
         raise error
     return found
+
+
+@functools.lru_cache(REMEMBERED)
+def _branch(family: Family, tool_mm: Vector) -> int:
+    """The branch in which the posture reaches its own pose."""
+    machine = Kinematics(family.structure, tool_mm=tool_mm)
+    near = np.array([family.structure.posture], float)
+    words = poses_of_axes(machine, near)
+    rotary = np.array([unit == "deg" for unit in family.structure.units])
+    found = [family.axes(words, tool_mm, branch)[0] for branch in range(family.branches)]
+    away = np.where(rotary, wrapped(np.array(found) - near), np.array(found) - near)
+    return int(np.argmin(np.nan_to_num(np.abs(away), nan=np.inf).max(axis=1)))
 
 
 def _of_legs(machine: Kinematics, values: Array) -> Array:

@@ -6,7 +6,7 @@ in two points each time. Nothing here knows a language or a file.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -31,6 +31,17 @@ _STRETCHED = 1e-9
 _STRAIGHT = 1e-5
 #: mm from the first axis within which its angle is not known.
 _ABOVE_MM = 1e-3
+
+
+#: Takes one of two choices of angles (n,) of an axis, by its number.
+Choose = Callable[[Sequence[Array], int], Array]
+#: The choices of angles (n,) with which to go on.
+Pick = Callable[[Sequence[Array]], Sequence[Array]]
+
+
+def both(choices: Sequence[Array]) -> Sequence[Array]:
+    """All choices."""
+    return choices
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,20 +95,35 @@ class Arm:
         """(n, 6) a posture that brings the flange to poses (n), NaN where there is none. It is chosen axis by
         axis next to axis values (n, 6), with the turns of these. Away from singular postures it is the
         nearest one."""
-        motion = flange @ self.flange.inverse()
-        centre, own = motion.at(self.wrist), np.radians(axes[:, self.columns])
-        with np.errstate(invalid="ignore", divide="ignore"):
-            (first,) = nearer([(angle,) for angle in self._first(centre)], own[:, 0])
-            ((second, third),) = self._shoulder_and_elbow(centre, first, own[:, 2])
-            held = self._turn(0, first) @ self._turn(1, second) @ self._turn(2, third)
-            (wrist,) = self._wrist(np.swapaxes(held, -1, -2) @ motion.rotation, own[:, 4])
-        return self._beside(axes, (first, second, third, *wrist))
+        own = np.radians(axes[:, self.columns])
 
-    def _beside(self, axes: Array, angles: tuple[Array, ...]) -> Array:
-        """(n, 6) `angles` as axis values, with the turns of `axes` (n, 6)."""
-        found = np.empty(axes.shape)
-        found[:, self.columns] = np.degrees(np.stack(angles, axis=1))
-        return np.asarray(axes - wrapped(axes - found))
+        def choose(choices: Sequence[Array], axis: int) -> Array:
+            return nearer(choices, own[:, axis])
+
+        return np.asarray(axes - wrapped(axes - self._chosen(flange, choose)))
+
+    def branch(self, flange: Poses, number: int) -> Array:
+        """(n, 6) one of the `postures`, by its number among them; NaN where not all axes are known."""
+        left = iter((number // 4, number // 2 % 2, number % 2))
+
+        def choose(choices: Sequence[Array], axis: int) -> Array:
+            return choices[next(left)]
+
+        return wrapped(self._chosen(flange, choose))
+
+    def _chosen(self, flange: Poses, choose: Choose) -> Array:
+        """(n, 6) axis values in degrees that bring the flange to poses (n), with one of two choices each of
+        the first, third and fifth axis."""
+        motion = flange @ self.flange.inverse()
+        centre, values = motion.at(self.wrist), np.empty((len(motion.position), AXES))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            first = choose(self._first(centre), 0)
+            ((second, third),) = self._shoulder_and_elbow(centre, first, lambda of: [choose(of, 2)])
+            held = self._turn(0, first) @ self._turn(1, second) @ self._turn(2, third)
+            rest = np.swapaxes(held, -1, -2) @ motion.rotation
+            (wrist,) = self._wrist(rest, lambda of: [choose(of, 4)])
+        values[:, self.columns] = np.degrees(np.stack((first, second, third, *wrist), axis=1))
+        return values
 
     def branches(self, axes: Array) -> Array:
         """(..., 4) what tells postures apart: mm, mm and twice deg of the bend. They are positive where the
@@ -148,37 +174,35 @@ class Arm:
         return [np.where(near, np.nan, angle) for angle in found]
 
     def _shoulder_and_elbow(
-        self, centre: Array, first: Array, near: Array | None = None
-    ) -> Sequence[tuple[Array, ...]]:
-        """(n,) angles of the second and the third axis; those alone whose third is next to `near`."""
+        self, centre: Array, first: Array, pick: Pick = both
+    ) -> list[tuple[Array, Array]]:
+        """(n,) angles of the second and the third axis, for those of the third that are picked."""
         place = self.point[0] + turned(self._turn(0, -first), centre - self.point[0])
-        return self._lower_arm(place, self.wrist, near)
+        return self._lower_arm(place, self.wrist, pick)
 
-    def _lower_arm(self, place: Array, end: Array, near: Array | None = None) -> Sequence[tuple[Array, ...]]:
-        """(n,) angles of the second and the third axis that bring the point `end` to places (n, 3); those
-        alone whose third is next to `near`."""
+    def _lower_arm(self, place: Array, end: Array, pick: Pick = both) -> list[tuple[Array, Array]]:
+        """(n,) angles of the second and the third axis that bring the point `end` to places (n, 3), for those
+        of the third that are picked."""
         side = self.direction[1]
         lower, upper = self.point[2] - self.point[1], end - self.point[2]
         # the third axis may run against the second
         sense = float(self.direction[2] @ side)
 
-        def bends(choices: Choices) -> Choices:
-            own = [(angle * sense,) for (angle,) in choices]
-            return [(angle * sense,) for (angle,) in pick(own)]
+        def bends(choices: Sequence[Array]) -> Sequence[Array]:
+            return [angle * sense for angle in pick([angle * sense for angle in choices])]
 
         pairs = two_turns(side, lower, upper, place - self.point[1], bends)
         return [(second, third * sense) for second, third in pairs]
 
-    def _wrist(self, rest: Array, near: Array | None = None) -> list[tuple[Array, Array, Array]]:
-        """(n,) angles of the last three axes, whose rotation is `rest` (n, 3, 3); those alone whose fifth is
-        next to `near`."""
+    def _wrist(self, rest: Array, pick: Pick = both) -> list[tuple[Array, Array, Array]]:
+        """(n,) angles of the last three axes, whose rotation is `rest` (n, 3, 3), for those of the fifth that
+        are picked."""
         fourth, fifth, sixth = self.direction[3:]
         along = turned(rest, sixth)
         inner = fifth * (fifth @ sixth)
         want = along @ fourth - fourth @ inner
         found = []
-        bends = [(angle,) for angle in met(fourth @ (sixth - inner), fourth @ np.cross(fifth, sixth), want)]
-        for (angle,) in bends if near is None else [nearer(bends, near)]:
+        for angle in pick(met(fourth @ (sixth - inner), fourth @ np.cross(fifth, sixth), want)):
             bent = self._turn(4, angle)
             start = turned(bent, sixth)
             straight = np.linalg.norm(np.cross(start, fourth), axis=1) < _STRAIGHT
@@ -190,13 +214,15 @@ class Arm:
         return found
 
 
-def two_turns(axis: Array, lower: Array, upper: Array, reach: Array) -> list[tuple[Array, Array]]:
+def two_turns(
+    axis: Array, lower: Array, upper: Array, reach: Array, pick: Pick = both
+) -> list[tuple[Array, Array]]:
     """(n,) both pairs of angles about `axis` (3,) by which two links (3,), one behind the other, end at
-    vectors `reach` (n, 3) across the axis; NaN where there are none."""
+    vectors `reach` (n, 3) across the axis, or those whose second is picked; NaN where there are none."""
     lower, upper, reach = (v - (v @ axis)[..., None] * axis for v in (lower, upper, reach))
     want = (np.sum(reach * reach, axis=1) - lower @ lower - upper @ upper) / 2.0
     pairs = []
-    for angle in met(lower @ upper, lower @ np.cross(axis, upper), want):
+    for angle in pick(met(lower @ upper, lower @ np.cross(axis, upper), want)):
         tip = lower + turned(axis_rotation(axis, angle), upper)
         pairs.append((angle_about(axis, tip, reach), angle))
     return pairs
@@ -223,11 +249,11 @@ def meeting(direction: Array, point: Array) -> tuple[Array, float]:
     return place, float(np.linalg.norm(turned(across, place - point), axis=1).max())
 
 
-def nearer(choices: Sequence[tuple[Array, ...]], near: Array, which: int = 0) -> tuple[Array, ...]:
-    """Of two choices of angles (n,) row by row the one whose angle `which` is next to another one."""
-    first, second = (np.abs(np.remainder(own[which] - near + np.pi, 2.0 * np.pi) - np.pi) for own in choices)
-    other = (second < first) | np.isnan(first)
-    return tuple(np.where(other, b, a) for a, b in zip(*choices, strict=True))
+def nearer(choices: Sequence[Array], near: Array) -> Array:
+    """(n,) of two choices of angles (n,) row by row the one that is next to another angle."""
+    first, second = choices
+    far = [np.abs(np.remainder(own - near + np.pi, 2.0 * np.pi) - np.pi) for own in choices]
+    return np.where((far[1] < far[0]) | np.isnan(far[0]), second, first)
 
 
 def met(cosine: Array | float, sine: Array | float, want: Array) -> list[Array]:
