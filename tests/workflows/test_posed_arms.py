@@ -114,7 +114,7 @@ CASES = {
 }
 
 
-def written(folder: Path, case: Case, seed: int, *, errors: bool = True) -> Path:
+def written(folder: Path, case: Case, seed: int, *, errors: bool = True, play: bool = False) -> Path:
     """The files of a machine with random errors of all sources."""
     made = Made(list(case.chain), dict(case.axes), "pose", {}, {}, case.gauge, case.tool)
     text = machine_text(made, "linuxcnc", 1e-6, UP)
@@ -125,7 +125,7 @@ def written(folder: Path, case: Case, seed: int, *, errors: bool = True) -> Path
         text = text.replace('calibration = "calibration.toml"\n', "")
     machine = folder / "machine.toml"
     machine.write_text(text)
-    calibration = calibration_text(folder, made, np.random.default_rng(seed), play=False)
+    calibration = calibration_text(folder, made, np.random.default_rng(seed), play=play)
     (folder / "calibration.toml").write_text(calibration)
     return machine
 
@@ -237,10 +237,51 @@ def test_the_tool_is_where_the_program_says(kind: str, tmp_path: Path) -> None:
     assert np.linalg.norm(off, axis=1).max() > 0.1
 
 
+def driven(q: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """(n, axes) the sides of the play of axes that go along (n, axes), from the middle of it on."""
+    load, sides = q[0].copy(), np.zeros(q.shape)
+    for row, drive in enumerate(q):
+        load = np.clip(load, drive - 0.5 * width, drive + 0.5 * width)
+        sides[row] = 2.0 * (drive - load) / width
+    return sides
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["scara to the left", "polar", "arm"])
+@pytest.mark.oracle
+@pytest.mark.parametrize(
+    "kind",
+    ["scara to the left", *(pytest.param(k, marks=pytest.mark.campaign) for k in ("polar table", "arm"))],
+)
+def test_backlash_is_taken_up(kind: str, tmp_path: Path) -> None:
+    case = CASES[kind]
+    machine = written(tmp_path, case, 5, play=True)
+    to_and_fro = [" ".join(f"{a}{way}" for a in "XYZ" + case.turns) for way in (3.0, -5.0)]
+    blocks = [case.blocks[0], f"G91 {to_and_fro[0]}", to_and_fro[1], "G90", *case.blocks]
+    text = HEAD + "\n".join(blocks) + "\nM30\n"
+    result = olp.correct_joints(text.encode(), machine, tolerance_urad=2.0)
+    assert result.report["verdict"]["ok"]
+    control, words = Control(machine, case), wanted(read(text, case.turns))
+    moves = list(pairwise(read(result.data.decode(), case.turns)))
+    shares = np.arange(1, 21) / 20.0
+    q = control.axes(np.array([a[1] + share * (b[1] - a[1]) for a, b in moves for share in shares]))
+    play = control.judge.errors["backlash"]
+    width = [
+        np.degrees(1e-6) * play[f"{name}_urad"] if axis.kind == "rotary" else 1e-3 * play[f"{name}_um"]
+        for name, axis in case.axes.items()
+    ]
+    feeds = np.flatnonzero(np.repeat([b[0] != "G0" for _, b in moves], len(shares)))[::53]
+    tools = control.judge.pose(q[feeds], True, driven(q, np.array(width))[feeds])
+    worst = np.max([nearest(words, control, tool) for tool in tools], axis=0)
+    assert worst[0] < 1.02e-3
+    assert worst[1] < 2.1e-6
+
+
+@pytest.mark.parametrize(
+    "kind", ["polar", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("scara to the left", "arm"))]
+)
 def test_a_machine_without_errors_changes_nothing(kind: str, tmp_path: Path) -> None:
-    machine, text = written(tmp_path, CASES[kind], 3, errors=False), program_of(CASES[kind])
+    machine = written(tmp_path, CASES[kind], 3, errors=False)
+    text = HEAD + "\n".join(CASES[kind].blocks[:3]) + "\nM30\n"
     assert olp.correct_joints(text.encode(), machine).data.decode().endswith(text)
 
 
@@ -303,6 +344,14 @@ def elbow_left(words: np.ndarray) -> np.ndarray:
         (np.degrees(first), np.degrees(second), 370.0 - words[:, 2], np.degrees(turn - first - second)),
         axis=1,
     )
+
+
+def test_lists_alone_are_read_where_no_words_are_poses(tmp_path: Path) -> None:
+    machine = written(tmp_path, CASES["scara to the left"], 3, errors=False)
+    lines = machine.read_text().splitlines(keepends=True)
+    machine.write_text("".join(x for x in lines if not x.startswith(("program_words", "posture"))))
+    with pytest.raises(ProgramError, match='or program_words = "pose" in'):
+        olp.correct_joints(b"G0 X0\n", machine)
 
 
 @pytest.mark.slow
