@@ -38,7 +38,8 @@ def follow(path: JointPath) -> None:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Ways:
     """Places (p,) along moves in their order: the `move` of each, its `share`, its (p, axes) `words` and
-    `axes`, and its (p,) `mobility`."""
+    `axes`, and its (p,) `mobility`. From one to the next it goes along the move of that one, except to places
+    at share 0."""
 
     path: JointPath
     move: Index
@@ -49,11 +50,16 @@ class _Ways:
 
     @staticmethod
     def of(path: JointPath, rows: Index) -> _Ways:
-        """The ends of moves, and places between."""
-        ends = [_Ways.at(path, rows, np.full(len(rows), share)) for share in (0.0, 1.0)]
-        parts = path.samples(rows, ends[0].axes, ends[1].axes) + 1
-        owner, step = spread(parts + 1)
-        return _Ways.at(path, rows[owner], step / parts[owner])
+        """The ends of moves, places along arcs, and starts where no move before ends there."""
+        before = rows - 1
+        fresh = np.append(True, rows[:-1] != before[1:])[: len(rows)] | (path.tool[rows] != path.tool[before])
+        fresh |= (path.start[rows] != path.end[before]).any(axis=1)
+        count = path.curves.samples(rows, 1.0) + 1
+        owner, step = spread(count)
+        share = np.append(np.zeros(int(fresh.sum())), (step + 1) / count[owner])
+        move = np.append(rows[fresh], rows[owner])
+        order = np.lexsort((share, move))
+        return _Ways.at(path, move[order], share[order])
 
     @staticmethod
     def at(path: JointPath, move: Index, share: Array) -> _Ways:
@@ -79,7 +85,7 @@ class _Ways:
             least = np.minimum(ways.mobility[1:], ways.mobility[:-1])
             way = np.linalg.norm(np.diff(ways.words, axis=0) * scale, axis=1)
             parts = np.ceil(way / (REFERENCE_RADIUS_MM * least**2)).clip(1, _PARTS).astype(np.int64)
-            parts[ways.move[1:] != ways.move[:-1]] = 1
+            parts[ways.share[1:] == 0.0] = 1
             if (parts == 1).all():
                 break
             if parts.sum() > _MOST:
@@ -90,8 +96,9 @@ class _Ways:
     def closer(self, parts: Index) -> _Ways:
         """With the ways between neighbours in parts (p - 1,)."""
         owner, step = spread(parts - 1)
-        share = self.share[owner] + (step + 1) / parts[owner] * (self.share[owner + 1] - self.share[owner])
-        more = _Ways.at(self.path, self.move[owner], share)
+        begin = np.where(self.move[1:] == self.move[:-1], self.share[:-1], 0.0)[owner]
+        share = begin + (step + 1) / parts[owner] * (self.share[1:][owner] - begin)
+        more = _Ways.at(self.path, self.move[1:][owner], share)
         order = np.lexsort((np.append(self.share, share), np.append(self.move, more.move)))
         names = ("move", "share", "words", "axes", "mobility")
         both = [np.concatenate((getattr(self, name), getattr(more, name)))[order] for name in names]
@@ -108,7 +115,7 @@ class _Ways:
         assert structure.posture is not None
         turning = np.array([unit == "deg" for unit in structure.units])
         far = np.abs(np.diff(self.axes, axis=0)) * turning > _ROUND_DEG
-        far[self.move[1:] != self.move[:-1]] = False
+        far[self.share[1:] == 0.0] = False
         if far.any():
             row = int(np.argmax(far.any(axis=1)))
             column = int(np.argmax(far[row]))
@@ -116,7 +123,7 @@ class _Ways:
                 f"along this move {structure.order[column]} goes further than half a turn from its "
                 f"{structure.posture[column]:g} deg in kinematics.posture; state a posture in the middle of "
                 "the program, or place the part elsewhere",
-                int(self.path.line[self.move[row]]),
+                int(self.path.line[self.move[row + 1]]),
             )
 
 
