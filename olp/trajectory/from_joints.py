@@ -121,6 +121,8 @@ def routes_of(
     rows = np.flatnonzero(known)
     ends = [motion.axes(at[rows], path.tool[rows], path.tip[rows]) for at in (path.start, path.end)]
     moved[rows] = np.abs(ends[1] - ends[0]).max(axis=1, initial=0.0) > _STILL
+    # a full circle ends where it began
+    moved |= known & path.curves.mask
     routes = []
     edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False])).astype(np.int8)))
     for first, stop in zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True):

@@ -375,7 +375,10 @@ def test_all_that_reads_a_program_takes_its_words_as_poses(tmp_path: Path) -> No
         axis = summary["axes"][name]
         ends = [axis[f"{end}_{case.axes[name].unit}"] for end in ("from", "to")]
         assert ends == pytest.approx([joints[:, column].min(), joints[:, column].max()])
+    circle = program.replace("M30", "G2 I-20.\nM30").encode()
     retimed = olp.retime_joints(program.encode(), machine)
+    more_s = olp.retime_joints(circle, machine).duration_s - retimed.duration_s
+    assert more_s == pytest.approx(40.0 * np.pi / 15.0, rel=0.02)
     (stretch,) = retimed.stretches
     time = np.linspace(0.0, stretch.trajectory.duration_s, 200)
     values = retimed.at(0, time)[0]
