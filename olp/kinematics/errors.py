@@ -19,6 +19,8 @@ COMPONENTS = (*"XYZABC", "own")
 OWN = 6
 #: Degrees of a full turn.
 TURN_DEG = 360.0
+#: A number of waves in a turn is whole within this.
+_WHOLE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +70,13 @@ class JointErrors:
     zero: float = 0.0
     datum: float = 0.0
     backlash: float = 0.0
+
+    @property
+    def repeats(self) -> bool:
+        """Whether a rotary joint has the same errors after a whole turn, either way round."""
+        turns = [TURN_DEG / wave.period for wave in self.harmonics]
+        whole = all(abs(number - round(number)) < _WHOLE for number in turns)
+        return whole and all(curve.periodic for curve in self.curves) and self.backlash == 0.0
 
 
 @dataclass(frozen=True, slots=True)

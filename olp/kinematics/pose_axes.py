@@ -4,7 +4,7 @@ those in one branch of serial axes."""
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from olp.core.units import AXES
 from olp.kinematics.branches import REMEMBERED, Family, family_of
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.coordinates import TURNS, poses_of_axes, stated_poses, stated_turns, states_poses
+from olp.kinematics.errors import TURN_DEG
 from olp.kinematics.poses import shift
 from olp.kinematics.postures import wrapped
 from olp.kinematics.structure import REFERENCE_RADIUS_MM, Joint, Leg, Structure
@@ -28,14 +29,18 @@ _CLOSED = 1e-7
 _AT_END = 1e-9
 
 
-def posed(structure: Structure, poses: bool, posture: Mapping[str, float] | None) -> Structure:
-    """A structure whose words state `poses`, with the posture of serial axes that names the branch. Raises
-    ConfigError where they do not, where the posture is not stated, and where it is singular."""
+def posed(
+    structure: Structure, poses: bool, posture: Mapping[str, float] | None, endless: Sequence[str] = ()
+) -> Structure:
+    """A structure whose words state `poses`, with the posture of serial axes that names the branch, and those
+    that the control leads on over whole turns. Raises ConfigError where words do not state poses, where the
+    posture is not stated or singular, and for `endless` axes that are not rotary."""
     serial = family_of(structure) is not None
     if not serial or not poses:
-        if posture is not None:
+        if posture is not None or endless:
+            name = "endless" if posture is None else "posture"
             raise _wrong(
-                'kinematics.posture is read with program_words = "pose", on serial axes; leave it out'
+                f'kinematics.{name} is read with program_words = "pose", on serial axes; leave it out'
             )
         if poses and not states_poses(structure):
             raise _wrong(
@@ -51,7 +56,11 @@ def posed(structure: Structure, poses: bool, posture: Mapping[str, float] | None
             f"kinematics.posture names {', '.join(posture or ()) or 'nothing'}; expected the value of every "
             f"axis in the branch that the control takes, such as posture = {{ {lacking} }}"
         )
-    made = replace(structure, posture=tuple(posture[name] for name in names))
+    rotary = [name for name, joint in structure.joints.items() if joint.kind == "rotary"]
+    if not set(endless) <= set(rotary):
+        raise _wrong(f"kinematics.endless names {', '.join(endless)}; expected some of {', '.join(rotary)}")
+    posture_of = tuple(posture[name] for name in names)
+    made = replace(structure, posture=posture_of, endless=frozenset(endless))
     values = np.array([made.posture], float)
     machine = Kinematics(made)
     if stated_mobility(machine, values)[0] < SINGULAR:
@@ -59,6 +68,24 @@ def posed(structure: Structure, poses: bool, posture: Mapping[str, float] | None
             "kinematics.posture is singular, where branches meet; expected one in the middle of the work"
         )
     return made
+
+
+def led_on(structure: Structure, values: Array, near: Array) -> Array:
+    """(n, axes) axis values with the whole turns of endless axes that bring them next to `near` (n, axes)."""
+    columns = [structure.order.index(name) for name in structure.endless]
+    if not columns:
+        return values
+    led = values.copy()
+    led[:, columns] = near[:, columns] - wrapped(near[:, columns] - values[:, columns])
+    return led
+
+
+def led_in_order(structure: Structure, values: Array) -> Array:
+    """(n, axes) axis values one behind the other, with the whole turns that endless axes have gone on by."""
+    columns = [structure.order.index(name) for name in structure.endless]
+    led = values.copy()
+    led[:, columns] = np.unwrap(values[:, columns], period=TURN_DEG, axis=0)
+    return led
 
 
 def _wrong(what: str) -> ConfigError:

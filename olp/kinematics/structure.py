@@ -88,6 +88,7 @@ class Structure:
     """A machine of any joints. `chain` names joints and platforms from workpiece to tool, with `F` for the
     frame; `joints` are all axes, also those of legs and carriages, in the order of columns of axis values.
     Where words of programs state poses of serial axes, `posture` are axis values in the branch they mean.
+    The control leads `endless` rotary axes on over whole turns; else they are within half a turn of it.
 
     Raises ConfigError where the parts do not fit each other.
     """
@@ -100,6 +101,7 @@ class Structure:
     gravity: Vector = (0.0, 0.0, -1.0)
     symmetric_tool: bool = True
     posture: tuple[float, ...] | None = None
+    endless: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         problems = structure_problems(self.chain, self.joints, self.platforms)

@@ -18,6 +18,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ConfigError
 from olp.core.toolpath import Arcs, Flag, Kind
 from olp.core.values import dataclass
+from olp.kinematics.pose_axes import led_in_order, led_on
 from olp.kinematics.structure import Structure
 from olp.program.feeds.timing import PathControl, Timing, timing
 from olp.trajectory.from_program import CHORD_SHARE, EXACT_MM, TANGENT_RAD
@@ -172,6 +173,7 @@ def _route(path: JointPath, clock: Timing, steps: _Steps) -> JointRoute:
     move = steps.move[owner]
     share = (number + 1) / count[owner]
     axes = np.vstack((_axes(path, steps.move[:1], np.zeros(1)), _axes(path, move, share)))
+    axes = led_in_order(path.motion.structure, axes)
     tool = path.tool[move]
     scale, widest = _scale(path.motion, axes, np.append(tool[:1], tool))
     point = axes * scale
@@ -207,10 +209,12 @@ def _chords(path: JointPath, move: Index, sagitta_mm: Array) -> Index:
         begin = place * (1.0 - 1.0 / few)
         ends = [_axes(path, move, begin + part / few) for part in (0.0, 1.0)]
         middle = _axes(path, move, begin + 0.5 / few)
-        straight = 0.5 * (ends[0] + ends[1])
+        straight = 0.5 * (ends[0] + led_on(path.motion.structure, ends[1], ends[0]))
         off = np.linalg.norm(_tips(path, move, straight) - _tips(path, move, middle), axis=1)
         away = np.maximum(away, off)
-    return np.asarray(np.clip(np.ceil(few * np.sqrt(away / sagitta_mm)), 1, _MOST), np.int64)
+    # of a whole turn of an axis the ends alone tell nothing
+    least = few if path.motion.structure.endless else np.ones(len(move))
+    return np.asarray(np.clip(np.ceil(few * np.sqrt(away / sagitta_mm)), least, _MOST), np.int64)
 
 
 def _scale(motion: Motion, axes: Array, tool: Index) -> tuple[Array, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -276,6 +276,71 @@ def test_backlash_is_taken_up(kind: str, tmp_path: Path) -> None:
     assert worst[1] < 2.1e-6
 
 
+def endless(folder: Path, keys: str = "endless = ['C']") -> tuple[Path, Case]:
+    """A polar machine whose turn has no end; its errors repeat."""
+    blocks = (
+        "G0 X150. Y-40. Z30.", "G1 X140. F900", "G2 X140. I-140. J40.", "G2 X140. I-140. J40.", "G1 Z20.",
+        "X-90. Y-70.", "X-80. Y60.",
+    )  # fmt: skip
+    case = replace(polar("C F Z X"), blocks=blocks)
+    axes = {**case.axes, "C": rotary(UP, (0, 0, 0), 180.0)}
+    machine = written(folder, replace(case, axes=axes), 5)
+    text = machine.read_text().replace("[-180.000000000, 180.000000000]", "[-1e5, 1e5]")
+    machine.write_text(text.replace("posture =", f"{keys}\nposture ="))
+    errors = folder / "calibration.toml"
+    errors.write_text(errors.read_text().replace('file = "C.csv"', 'file = "C.csv"\nperiodic = true'))
+    return machine, case
+
+
+@pytest.mark.slow
+@pytest.mark.oracle
+def test_an_endless_axis_goes_on_over_whole_turns(tmp_path: Path) -> None:
+    machine, case = endless(tmp_path)
+    text = program_of(case)
+    result = olp.correct_joints(text.encode(), machine)
+    assert result.report["verdict"]["ok"]
+    simulated = olp.simulate_joints(text.encode(), machine)
+    turn = simulated.axes[:, list(case.axes).index("C")]
+    assert np.abs(np.diff(turn)).max() < 10.0
+    assert np.ptp(turn) > 720.0
+    limit(machine, case)
+    way = np.linalg.norm(np.diff(simulated.points_mm, axis=0), axis=1).sum()
+    retimed = olp.retime_joints(text.encode(), machine)
+    assert retimed.duration_s == pytest.approx(way / 15.0, rel=0.05)
+    assert retimed.report["waypoints"] < 1000
+    control, path = Control(machine, case), simulated.points_mm
+    assert np.linalg.norm(path - control.judge.pose(simulated.axes, True)[:, :3, 3], axis=1).max() < 1e-9
+    # around twice the tool is on the circle, and on its lines elsewhere
+    moves = [place for _, place in read(result.data.decode(), "")]
+    places = np.array([a + share * (b - a) for a, b in pairwise(moves[1:]) for share in (0.5, 1.0)])
+    tools = control.actual(places)[:, :3, 3]
+    circle = np.hypot(np.hypot(*tools[:, :2].T) - np.hypot(140.0, 40.0), tools[:, 2] - 30.0)
+    flat = [np.array(line) for line in (((140, -40, 30), (140, -40, 20)), ((140, -40, 20), (-90, -70, 20)))]
+    flat += [np.array(((150, -40, 30), (140, -40, 30))), np.array(((-90, -70, 20), (-80, 60, 20)))]
+    lines = [np.linalg.norm(np.cross(tools - a, b - a), axis=1) / np.linalg.norm(b - a) for a, b in flat]
+    assert np.minimum(circle, np.min(lines, axis=0)).max() < 1.02e-3
+    assert (circle < 1.02e-3).sum() > 200
+
+
+@pytest.mark.parametrize(
+    ("keys", "error", "why"),
+    [
+        ("", ProgramError, "C goes further than half a turn"),
+        ("endless = ['X']", ConfigError, "names X; expected some of C"),
+        ("endless = ['C']", ConfigError, "whose errors are others in the next turn"),
+    ],
+)
+def test_an_axis_is_endless_where_that_is_stated_and_right(
+    keys: str, error: type[Exception], why: str, tmp_path: Path
+) -> None:
+    machine, case = endless(tmp_path, keys)
+    if error is ConfigError:
+        errors = tmp_path / "calibration.toml"
+        errors.write_text(errors.read_text().replace("\nperiodic = true", ""))
+    with pytest.raises(error, match=re.escape(why)):
+        olp.correct_joints(program_of(case).encode(), machine)
+
+
 @pytest.mark.parametrize(
     "kind", ["polar", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("scara to the left", "arm"))]
 )
@@ -354,15 +419,20 @@ def test_lists_alone_are_read_where_no_words_are_poses(tmp_path: Path) -> None:
         olp.correct_joints(b"G0 X0\n", machine)
 
 
-@pytest.mark.slow
-def test_all_that_reads_a_program_takes_its_words_as_poses(tmp_path: Path) -> None:
-    case = CASES["scara to the left"]
-    machine = written(tmp_path, case, 3, errors=False)
+def limit(machine: Path, case: Case) -> None:
+    """Velocity, acceleration and jerk of all axes."""
     limits = "velocity_{0}_s = 300.0\nacceleration_{0}_s2 = 2000.0\njerk_{0}_s3 = 30000.0\n"
     text = machine.read_text()
     for name, axis in case.axes.items():
         text = text.replace(f"[axes.{name}]\n", f"[axes.{name}]\n{limits.format(axis.unit)}")
     machine.write_text(text)
+
+
+@pytest.mark.slow
+def test_all_that_reads_a_program_takes_its_words_as_poses(tmp_path: Path) -> None:
+    case = CASES["scara to the left"]
+    machine = written(tmp_path, case, 3, errors=False)
+    limit(machine, case)
     program = HEAD + "\n".join(case.blocks[:3]) + "\nM30\n"
     places = np.array([place for _, place in read(program, case.turns)])
     joints = elbow_left(places)

@@ -8,7 +8,7 @@ from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.posed import refused
 from olp.compensation.joints.sampling import spread
 from olp.core.arrays import Array, Index
-from olp.core.errors import NotInvertible, ProgramError
+from olp.core.errors import ConfigError, NotInvertible, ProgramError
 from olp.core.values import dataclass
 from olp.kinematics.pose_axes import SINGULAR
 from olp.kinematics.structure import REFERENCE_RADIUS_MM
@@ -25,9 +25,11 @@ _PARTS = 64
 
 def follow(path: JointPath) -> None:
     """Looks along the moves of serial axes that are led by poses. Raises ProgramError for one that comes to a
-    singular posture or leaves the branch, or goes further than half a turn from the stated posture."""
+    singular posture or leaves the branch, or goes further than half a turn from the stated posture.
+    ConfigError: for an endless axis whose errors do not repeat."""
     if not path.coordinates.poses or path.motion.structure.posture is None:
         return
+    _refuse_unrepeated(path)
     known = np.isfinite(path.start).all(axis=1) & np.isfinite(path.end).all(axis=1)
     moves = path.curves.mask | (path.start != path.end).any(axis=1)
     rows = np.flatnonzero(known & ~path.kept & moves)
@@ -116,6 +118,7 @@ class _Ways:
         turning = np.array([unit == "deg" for unit in structure.units])
         far = np.abs(np.diff(self.axes, axis=0)) * turning > _ROUND_DEG
         far[self.share[1:] == 0.0] = False
+        far[:, [structure.order.index(name) for name in structure.endless]] = False
         if far.any():
             row = int(np.argmax(far.any(axis=1)))
             column = int(np.argmax(far[row]))
@@ -124,6 +127,16 @@ class _Ways:
                 f"{structure.posture[column]:g} deg in kinematics.posture; state a posture in the middle of "
                 "the program, or place the part elsewhere",
                 int(self.path.line[self.move[row + 1]]),
+            )
+
+
+def _refuse_unrepeated(path: JointPath) -> None:
+    errors, structure = path.motion.machines[0].errors.joints, path.motion.structure
+    for name in sorted(structure.endless):
+        if name in errors and not errors[name].repeats:
+            raise ConfigError(
+                f"kinematics.endless names {name}, whose errors are others in the next turn; expected curves "
+                "that are periodic, harmonics of whole parts of a turn, and no backlash"
             )
 
 

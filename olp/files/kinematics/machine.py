@@ -51,7 +51,8 @@ def load_joint_machine(path: PathLike, read: Reader = read_bytes) -> JointMachin
     symmetric = len(slides) >= len(OWN_DIRECTIONS) if symmetry is None else symmetry == "axis"
     try:
         structure = Structure(file.name, chain, joints, platforms, gauge, gravity, symmetric)
-        structure = posed(structure, file.kinematics.program_words == "pose", file.kinematics.posture)
+        words = file.kinematics
+        structure = posed(structure, words.program_words == "pose", words.posture, words.endless)
     except ConfigError as error:
         raise config_error([(None, problem) for problem in error.problems], str(path)) from None
     default = file.job_defaults.tool

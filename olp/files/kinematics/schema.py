@@ -172,6 +172,12 @@ class KinematicsTable(Table):
         "one posture of the branch that the control takes. Such as { J1 = 0.0, J2 = 90.0, J3 = 0.0 }; rotary "
         "axes stay within half a turn of it",
     )
+    endless: list[Text] = Field(
+        default=[],
+        description="rotary axes of posture that the control leads on over whole turns, as `rosekins` of "
+        "LinuxCNC does: their values count within half a turn of posture. Their errors have to repeat with "
+        "every turn, without backlash",
+    )
     swivel_axis: Text | None = Field(
         default=None,
         description="the rotary axis that the swivel data of a Sinumerik control have as reference of the "

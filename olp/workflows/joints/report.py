@@ -19,6 +19,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Kind
 from olp.core.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
 from olp.findings.catalogue import Finding
+from olp.kinematics.errors import TURN_DEG
 from olp.kinematics.machine import JointCalibration
 from olp.program.robots.dialect import RobotDialect
 from olp.proof.joints import Deviation, JointProof, largest_steps
@@ -296,6 +297,8 @@ def outside_box(path: JointPath, plan: JointPlan, run: JointRun) -> list[tuple[i
     ends = ~(plan.stands & (plan.share == 1.0))
     for column, name in enumerate(structure.order):
         low, high = run.calibration.box[name]
+        if name in structure.endless and high - low > TURN_DEG - _AT_END:
+            continue
         value = np.where(ends, plan.axes[:, column], np.nan)
         with np.errstate(invalid="ignore"):
             out = np.flatnonzero((value < low - _AT_END) | (value > high + _AT_END))

@@ -10,6 +10,7 @@ from olp.compensation.joints.sampling import spread
 from olp.core.arrays import Array, Index
 from olp.core.units import RAD_PER_URAD
 from olp.core.values import dataclass
+from olp.kinematics.pose_axes import led_in_order
 from olp.kinematics.poses import rotation_vector
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.joints.loaded import JointRun
@@ -72,4 +73,5 @@ def simulated(run: JointRun, options: UnrollOptions, step_mm: float) -> JointSim
     structure = motion.structure
     names = tuple(f"{name}_{unit}" for name, unit in zip(structure.order, structure.units, strict=True))
     report = {"schema": "olp-simulation-1", "frame": "workpiece", "points": len(move), **run.heads()}
+    axes = led_in_order(structure, axes)
     return JointSimulation(actual.position, turns, axes, path.line[move].astype(np.int64), names, report)
