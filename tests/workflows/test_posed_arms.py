@@ -215,9 +215,11 @@ def nearest(words: np.ndarray, control: Control, tool: np.ndarray) -> tuple[floa
     "kind",
     [
         "scara to the right",
-        "polar table",
         "arm",
-        *(pytest.param(kind, marks=pytest.mark.campaign) for kind in ("scara to the left", "polar")),
+        *(
+            pytest.param(kind, marks=pytest.mark.campaign)
+            for kind in ("scara to the left", "polar", "polar table")
+        ),
     ],
 )
 def test_the_tool_is_where_the_program_says(kind: str, tmp_path: Path) -> None:
