@@ -165,9 +165,10 @@ class Machine:
     None where it is not stated. `located` says whether positions in machine coordinates are known; where they
     are not, only distances are. `assumed`: nothing names the controller. `arm`: it is an arm, whose programs
     may state its joints. `track` is the way in mm by which one unit of the first external axis carries it,
-    None where it stands still. `external` are other external axes by their numbers, with the value at which
-    one stays, None where it moves neither arm nor workpiece. `third_level` is whether programs count the
-    third joint from the horizontal, None where that is not stated.
+    None where it stands still; with `track_errors` it is a joint with errors of its own. `external` are
+    other external axes by their numbers, with the value at which one stays, None where it moves neither arm
+    nor workpiece. `third_level` is whether programs count the third joint from the horizontal, None where
+    that is not stated.
     """
 
     name: str
@@ -206,6 +207,7 @@ class Machine:
     arm: bool = False
     third_level: bool | None = None
     track: Vector | None = None
+    track_errors: bool = False
     external: Mapping[int, float | None] = field(default_factory=dict)
     pulses_per_deg: tuple[float, ...] | None = None
 

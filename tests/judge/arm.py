@@ -29,7 +29,7 @@ class Arm:
     def __init__(self, machine: Path, zeros_urad: Sequence[float] = (0.0,) * 6) -> None:
         file = tomllib.loads(machine.read_text("utf-8"))
         joints = [file["axes"][name] for name in file["chain"].split()[1:]]
-        self.lines = [(np.array(j["direction"]), np.array(j["point_mm"])) for j in joints]
+        self.lines = [(np.array(j["direction"]), np.array(j.get("point_mm", np.zeros(3)))) for j in joints]
         gauge = file["gauge"]
         self.flange = np.array(gauge["point_mm"])
         self.turned = np.eye(3)
@@ -64,9 +64,45 @@ class Arm:
             found = found - np.linalg.solve(slopes, miss)
         raise AssertionError("no joints bring the flange there")
 
+    def carry(self, along_mm: float) -> None:
+        """Where what carries the arm is from now on; this one stands."""
+
     def _miss(self, joints: np.ndarray, rotation: np.ndarray, place: np.ndarray) -> np.ndarray:
         turn, here = self.pose(joints)
         return np.append(here - place, 500.0 * turned_by(turn, rotation))
+
+
+class OnTrack(Arm):
+    """An arm whose machine file has a linear joint E1 before its own six. Of errors that has a wrong
+    `zero_um`, a direction that is tilted by `tilt_urad`, and `motion_um`: by a meter of its way EX, EY, EZ in
+    um and EA, EB, EC in urad, about the machine's zero on the carriage."""
+
+    def __init__(
+        self, machine: Path, zeros_urad: Sequence[float], zero_um: float, tilt_urad: Sequence[float],
+        motion_um: Sequence[float],
+    ) -> None:  # fmt: skip
+        super().__init__(machine, zeros_urad)
+        (self.track, _), *self.lines = self.lines
+        self.own = zero_um * 1e-3 * self.track
+        self.tilt = np.cross(np.array(tilt_urad) * 1e-6, self.track)
+        self.motion = np.array(motion_um)
+        self.along = 0.0
+
+    def carry(self, along_mm: float) -> None:
+        self.along = along_mm
+
+    def pose(self, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rotation, place = super().pose(joints)
+        return rotation, place + self.along * self.track
+
+    def actual(self, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rotation, place = super().pose(joints + self.zeros)
+        shift, turns = np.split(self.motion * self.along * 1e-3, 2)
+        tilted = np.eye(3)
+        for axis, urad in zip(np.eye(3)[::-1], turns[::-1], strict=True):
+            tilted = tilted @ about(axis, np.degrees(urad * 1e-6))
+        away = self.along * (self.track + self.tilt) + self.own + shift * 1e-3
+        return tilted @ rotation, tilted @ place + away
 
 
 def turned_by(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -23,13 +23,14 @@ _NUMBER = re.compile(r"-?\d*\.?\d+(?:[eE][-+]?\d+)?")
 @dataclass(frozen=True)
 class Move:
     """A move: straight or not, and the joints in degrees, or the rotation and the place of the tip in the
-    world. `words` are those of the configuration."""
+    world. `words` are those of the configuration, and `outer` is the first external axis."""
 
     straight: bool
     joints: np.ndarray | None
     turn: np.ndarray = field(default_factory=lambda: np.eye(3))
     tip: np.ndarray = field(default_factory=lambda: np.zeros(3))
     words: tuple[str, ...] = ()
+    outer: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -70,12 +71,15 @@ def krl(text: bytes, frames: Frames) -> list[Move]:
     found = []
     for kind, target in re.findall(r"(?m)^\s*(LIN|PTP) ([^{\s]+|\{[^}]*\})", plain):
         words = _words(named.get(target, target))
+        outer = float(words.get("E1", "0"))
         if "A1" in words:
-            found.append(Move(False, np.array([float(words[f"A{k}"]) for k in range(1, 7)])))
+            values = np.array([float(words[f"A{k}"]) for k in range(1, 7)])
+            found.append(Move(False, values, outer=outer))
             continue
         place = np.array([float(words[name]) for name in "XYZ"])
         turn, tip = frames.placed(abc(*(float(words[name]) for name in "ABC")), place)
-        found.append(Move(kind == "LIN", None, turn, tip, (words.get("S", ""), words.get("T", ""))))
+        status = words.get("S", ""), words.get("T", "")
+        found.append(Move(kind == "LIN", None, turn, tip, status, outer))
     return found
 
 
@@ -87,12 +91,14 @@ def tp(text: bytes, frames: Frames) -> list[Move]:
         body = stated[number]
         config = re.search(r"CONFIG : '(.*?)'", body)
         words = _words(body[0 if config is None else config.end() :])
+        outer = float(words.get("E1", "0"))
         if config is None:
-            found.append(Move(False, np.array([float(words[f"J{k}"]) for k in range(1, 7)])))
+            values = np.array([float(words[f"J{k}"]) for k in range(1, 7)])
+            found.append(Move(False, values, outer=outer))
             continue
         place = np.array([float(words[name]) for name in "XYZ"])
         turn, tip = frames.placed(wpr(*(float(words[name]) for name in "WPR")), place)
-        found.append(Move(kind == "L", None, turn, tip, (config[1],)))
+        found.append(Move(kind == "L", None, turn, tip, (config[1],), outer))
     return found
 
 
@@ -104,13 +110,14 @@ def rapid(text: bytes, frames: Frames) -> list[Move]:
     for kind, target in re.findall(r"Move(L|J|AbsJ) (\w+|\[\[.*\]\]),v", plain):
         numbers = [float(number) for number in _NUMBER.findall(named.get(target, target))]
         if kind == "AbsJ":
-            found.append(Move(False, np.array(numbers[:6])))
+            found.append(Move(False, np.array(numbers[:6]), outer=numbers[6]))
             continue
         w, *axis = numbers[3:7]
         half = np.arctan2(np.linalg.norm(axis), w)
         own = rotvec(2 * half * np.array(axis) / np.linalg.norm(axis))
         turn, tip = frames.placed(own, np.array(numbers[:3]))
-        found.append(Move(kind == "L", None, turn, tip, tuple(f"{v:g}" for v in numbers[7:11])))
+        words = tuple(f"{v:g}" for v in numbers[7:11])
+        found.append(Move(kind == "L", None, turn, tip, words, numbers[11]))
     return found
 
 

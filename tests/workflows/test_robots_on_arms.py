@@ -258,11 +258,18 @@ def test_tip_and_tool_are_where_the_program_says(language: str, seed: int, tmp_p
     assert result.report["deviation"]["holds"]
     assert result.report["deviation"]["before"]["position_max_um"] > 300
     assert olp.verify_joints(text, result.data, machine).report["verdict"]["ok"]
-    arm, (digit, turn_digit) = Arm(machine, ZEROS), DIGITS[language]
-    wanted, found = READERS[language](text, FRAMES), READERS[language](result.data, FRAMES)
+    judged(Arm(machine, ZEROS), language, text, result.data, steps)
+
+
+def judged(arm: Arm, language: str, text: bytes, corrected: bytes, steps: list[Step]) -> None:
+    """Asserts that an arm that runs the corrected text is where the other one says, at the ends of moves and
+    along straight ones. `steps` are the kinds and the joints of the moves."""
+    digit, turn_digit = DIGITS[language]
+    wanted, found = READERS[language](text, FRAMES), READERS[language](corrected, FRAMES)
     assert len(wanted) == len(steps)
-    place, before, begun = 0, None, None
+    place, before, begun, came = 0, None, None, 0.0
     for want, (kind, guess) in zip(wanted, steps, strict=True):
+        arm.carry(want.outer)
         if want.joints is not None:
             rotation, flange = arm.pose(read_joints(want.joints, language))
             aim, tip = rotation @ TOOL, flange + rotation @ LEVER
@@ -271,6 +278,7 @@ def test_tip_and_tool_are_where_the_program_says(language: str, seed: int, tmp_p
         last = False
         while not last:
             move = found[place]
+            assert move.outer == want.outer
             joints = read_joints(move.joints, language)
             if joints is None:
                 turn = move.turn @ TOOL.T
@@ -280,7 +288,7 @@ def test_tip_and_tool_are_where_the_program_says(language: str, seed: int, tmp_p
             last = np.linalg.norm(here - tip) < 1e-3 + digit
             if last:
                 assert np.linalg.norm(turned_by(rotation @ TOOL, aim)) < 2e-6 + turn_digit
-            if kind == "L" and before is not None:
+            if kind == "L" and before is not None and came == move.outer:
                 ends = [arm.pose(q) for q in (before, joints)]
                 tips = [p + r @ LEVER for r, p in ends]
                 for share in (0.25, 0.5, 0.75):
@@ -291,7 +299,7 @@ def test_tip_and_tool_are_where_the_program_says(language: str, seed: int, tmp_p
                     assert np.linalg.norm(begun[1] + part * way - here) < 1e-3 + digit
                     miss = turned_by(rotation @ TOOL, between(begun[0], aim, min(max(part, 0.0), 1.0)))
                     assert np.linalg.norm(miss) < 1e-5 + 1e-3 / np.linalg.norm(way)
-            before, place = joints, place + 1
+            before, place, came = joints, place + 1, move.outer
         begun = aim, tip
     assert place == len(found)
 

@@ -13,12 +13,12 @@ from olp.compensation.joints.drilled import Drilled
 from olp.compensation.joints.motion import Motion
 from olp.compensation.joints.path import JointPath
 from olp.core.arrays import Array, Index, Mask
-from olp.core.errors import ProgramError
+from olp.core.errors import ConfigError, ProgramError
 from olp.core.machine import Vector
 from olp.core.values import dataclass
+from olp.kinematics.carried import Carried, carried_arm
 from olp.kinematics.coordinates import Coordinates
 from olp.kinematics.errors import MachineErrors
-from olp.kinematics.parallel_arm import arm_of
 from olp.kinematics.poses import Poses, turned
 from olp.kinematics.postures import AXES, POSTURES, Arm
 from olp.kinematics.structure import Structure
@@ -51,9 +51,9 @@ class ArmPath(JointPath):
     half_deg: Array = field(default_factory=lambda: np.zeros((0, AXES)))
 
     def singular(self, axes: Array) -> str:
-        arm = arm_of(self.motion.structure)
-        assert arm is not None
-        straight = abs(float(arm.branches(axes[None, None])[0, 0, _WRIST]))
+        held = carried_arm(self.motion.structure)
+        assert held is not None
+        straight = abs(float(held.arm.branches(held.own(axes)[None, None])[0, 0, _WRIST]))
         if straight > _STRAIGHT_DEG:
             return ""
         return f": the wrist is {straight:.2g} deg from straight, where two of its axes turn the tool alike"
@@ -64,33 +64,34 @@ class ArmPath(JointPath):
         rows = np.flatnonzero(self.feed[move] & (share != 0.0) & (share != 1.0))
         if not rows.size:
             return place
-        arm, tool = arm_of(self.motion.structure), self.tool[move[rows]]
-        assert arm is not None
+        held, tool = carried_arm(self.motion.structure), self.tool[move[rows]]
+        assert held is not None
+        arm = held.arm
         ends = [self.motion.nominal(axes[rows], tool) for axes in (start, end)]
         levers = np.array([machine.tool_mm for machine in self.motion.machines])[tool]
-        flange = _flange(led(ends[0], ends[1], share[rows]), levers)
-        found = arm.near(flange, place[rows])
-        far = np.flatnonzero(~(np.abs(found - place[rows]).max(axis=1) < _NEAR_DEG))
-        found[far] = nearest(
-            place[rows[far]], arm.postures(Poses(flange.rotation[far], flange.position[far]))
-        )
+        flange = held.held(_flange(led(ends[0], ends[1], share[rows]), levers), place[rows])
+        own = held.own(place[rows])
+        found = arm.near(flange, own)
+        far = np.flatnonzero(~(np.abs(found - own).max(axis=1) < _NEAR_DEG))
+        found[far] = nearest(own[far], arm.postures(flange.only(far)))
         lost = np.flatnonzero(np.isnan(found).any(axis=1))
         if lost.size:
             raise straight_wrist(int(self.line[move[rows[lost[0]]]]))
-        place[rows] = found
+        place[rows] = held.joined(found, held.along(place[rows]))
         return place
 
 
 def arm_path(
     program: Program, structure: Structure, errors: MachineErrors, start_deg: Array, *, from_level: bool
 ) -> ArmPath:  # fmt: skip
-    """The path of a robot program. `start_deg` (6,) is where the arm is at first, NaN where that is not
+    """The path of a robot program. `start_deg` (axes,) is where the arm is at first, NaN where that is not
     stated, and `from_level` as in `ArmPath`. Raises ProgramError with all targets that no posture reaches, or
     that name several."""
-    arm, targets, dialect = arm_of(structure), program.targets, program.dialect
-    assert arm is not None
+    held, targets, dialect = carried_arm(structure), program.targets, program.dialect
+    assert held is not None
     assert targets is not None
     assert isinstance(dialect, RobotDialect)
+    arm, structure = held.arm, held.kept(structure)
     count, uses, path = len(targets.uses), targets.uses, program.toolpath
     known = np.array([use is not None for use in uses], bool)
     rows = np.flatnonzero(known)
@@ -102,11 +103,18 @@ def arm_path(
     tool = np.zeros(count, np.int64)
     tool[rows] = [places[lever] for lever in levers]
     motion = Motion.of(structure, errors, [(lever, None) for lever in places])
+    if held.track is not None and motion.width[held.column] != 0.0:
+        raise ConfigError(
+            f"the calibration states backlash.{held.track.name}, and a program keeps where its track is as "
+            "written, so it is not taken up; approach each place of the track from one side, and state "
+            "errors measured so"
+        )
     unit = np.array([frame.unit_mm for frame in path.frames] or [1.0])[path.frame[rows]]
-    joints = used.joints(arm, from_level=from_level)
+    joints, along = used.joints(arm, from_level=from_level), used.along(held)
     flange = used.flange(unit, levers)
     stated = np.isfinite(joints[:, 0])
-    reached = motion.nominal(joints[stated], tool[rows][stated])
+    whole = held.joined(joints, along)[stated]
+    reached = held.held(motion.nominal(whole, tool[rows][stated]), whole)
     flange.rotation[stated], flange.position[stated] = reached.rotation, reached.position
     postures = np.full((len(rows), POSTURES, AXES), np.nan)
     posed, config = np.flatnonzero(~stated), used.config()
@@ -115,7 +123,7 @@ def arm_path(
     if posed.size:
         own = postures[posed]
         values[posed], fits[posed] = dialect.fitting(config[posed], own, arm.branches(own))
-    travel = np.array([joint.travel for joint in structure.joints.values()]).T
+    travel = held.own(np.array([joint.travel for joint in structure.joints.values()]).T)
     straight = used.mask("straight")
     begins: Mask = rows != np.append(-1, rows[:-1]) + 1
     before = path.line[np.maximum(rows - 1, 0)].astype(np.int64)
@@ -123,20 +131,21 @@ def arm_path(
         flange, joints, values, fits, straight, used.mask("free"),
         np.isnan(config).any(axis=1) | (config.shape[1] == 0), begins, np.where(begins, before, 0), used.line,
     )  # fmt: skip
-    end = np.full((count, AXES), np.nan)
-    end[rows] = Settled(arm, wanted, postures, travel).axes(start_deg)
-    feed, whole, none = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count, bool)
-    feed[rows], whole[rows] = straight, used.mask("whole")
-    start = np.vstack((np.full((1, AXES), np.nan), end[:-1]))[:count]
-    _refuse_turns(arm, start[rows], end[rows], straight & stated, used.line)
+    width = len(structure.order)
+    end = np.full((count, width), np.nan)
+    end[rows] = held.joined(Settled(arm, wanted, postures, travel).axes(held.own(start_deg)), along)
+    feed, unsplit, none = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count, bool)
+    feed[rows], unsplit[rows] = straight, used.mask("whole")
+    start = np.vstack((np.full((1, width), np.nan), end[:-1]))[:count]
+    _refuse_turns(arm, held.own(start[rows]), held.own(end[rows]), straight & stated, used.line)
     feed &= np.isfinite(start).all(axis=1)
     return ArmPath(
         program, motion, Coordinates.of_axes(structure), start, end,
-        np.full((count, AXES), -1, np.int32), tool, none, none,
-        np.zeros((count, 3)), np.zeros((count, AXES)), np.ones(count), np.ones(AXES), feed, known, ~known,
-        none, none, np.full(AXES, _DECIMALS), replace(Drilled.none(count), whole=whole),
+        np.full((count, width), -1, np.int32), tool, none, none,
+        np.zeros((count, 3)), np.zeros((count, width)), np.ones(count), np.ones(width), feed, known, ~known,
+        none, none, np.full(width, _DECIMALS), replace(Drilled.none(count), whole=unsplit),
         Directions.none(count), Curves.none(count), from_level=from_level,
-        half_deg=_filled(rows, used.half_deg(arm), count),
+        half_deg=_filled(rows, held.joined(used.half_deg(arm), 0.0), count),
     )  # fmt: skip
 
 
@@ -157,7 +166,7 @@ def _refuse_turns(arm: Arm, start: Array, end: Array, straight: Mask, line: Inde
 
 def _filled(rows: Index, values: Array, count: int) -> Array:
     """(n, axes) values at rows, 0 elsewhere."""
-    filled = np.zeros((count, AXES))
+    filled = np.zeros((count, values.shape[1]))
     filled[rows] = values
     return filled
 
@@ -183,6 +192,11 @@ class Used:
         values, blank = np.empty((len(self.uses), AXES)), (np.nan,) * AXES
         values[:, arm.columns] = np.array([own or blank for own in self.of("joints")]).reshape(-1, AXES)
         return arm.from_second(values) if from_level else values
+
+    def along(self, held: Carried) -> Array:
+        """(n,) where the carriage of an arm is, mm: the first external axis. 0 where the arm stands."""
+        moved = held.track is not None
+        return np.array([own[0] if moved else 0.0 for own in self.of("outer")]).reshape(len(self.uses))
 
     def half_deg(self, arm: Arm) -> Array:
         """(n, 6) half of a step of the motors, in which targets count joints; 0 where they do not."""

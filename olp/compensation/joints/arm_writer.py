@@ -20,7 +20,7 @@ from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Vector
 from olp.core.spool import whole
 from olp.core.values import dataclass
-from olp.kinematics.parallel_arm import arm_of
+from olp.kinematics.carried import carried_arm
 from olp.kinematics.poses import Poses, rotation_vector, turned
 from olp.program.robots.arcs import Bent
 from olp.program.robots.dialect import Replacement, RobotDialect
@@ -86,14 +86,14 @@ class _Writer:
 
     def __init__(self, path: ArmPath, plan: JointPlan, limits: JointLimits) -> None:
         program, targets = path.program, path.program.targets
-        arm = arm_of(path.motion.structure)
+        held = carried_arm(path.motion.structure)
         assert isinstance(program.dialect, RobotDialect)
         assert targets is not None
-        assert arm is not None
+        assert held is not None
         self.path, self.plan, self.program, self.targets = path, plan, program, targets
         self.limits, self.stands = limits, plan.stands
-        self.dialect, self.arm, self.tally = program.dialect, arm, Tally()
-        self.nominal, self.commands = path.end.tolist(), plan.command.tolist()
+        self.dialect, self.held, self.arm, self.tally = program.dialect, held, held.arm, Tally()
+        self.nominal, self.commands = (held.own(axes).tolist() for axes in (path.end, plan.command))
         self.clones = self.made = 0
         self.names: set[str] = set()
 
@@ -103,7 +103,7 @@ class _Writer:
         last = np.append(plan.move[1:] != plan.move[:-1], True)[: len(plan.move)]
         tool = self.path.tool[plan.move[rows]]
         poses = self.path.motion.nominal(plan.command[rows], tool)
-        places, turns = self._in_frames(rows, poses)
+        places, turns = self._in_frames(rows, self.held.held(poses, plan.command[rows]))
         in_joints = np.array([bool(self._target_of(row).joints) for row in rows.tolist()], bool)
         self._keep_branches(rows[~in_joints])
         by_target: dict[int, list[tuple[int, _Wanted]]] = {}
@@ -187,8 +187,8 @@ class _Writer:
     def _keep_branches(self, rows: Index) -> None:
         """Raises ProgramError where a corrected posture is of another branch than the programmed one."""
         plan, path = self.plan, self.path
-        nominal = path.at(plan.move[rows], plan.share[rows])
-        before, after = self.arm.branches(nominal), self.arm.branches(plan.command[rows])
+        nominal, command = path.at(plan.move[rows], plan.share[rows]), plan.command[rows]
+        before, after = (self.arm.branches(self.held.own(axes)) for axes in (nominal, command))
         other = ((before * after < 0.0) & (np.minimum(abs(before), abs(after)) > _BORDER)).any(axis=1)
         if other.any():
             raise ProgramError(
@@ -201,7 +201,8 @@ class _Writer:
     # -- what is wanted ------------------------------------------------------------------------------
 
     def _in_frames(self, rows: Index, poses: Poses) -> tuple[list[Vector], list[Quaternion]]:
-        """Where the tip is at poses of the end of the lever, and how it is turned, in the frames of rows."""
+        """Where the tip is at poses of the end of the lever, and how it is turned, in the frames of rows.
+        On a track poses and frames count from the carriage."""
         uses = [self._use(row) for row in rows.tolist()]
         frames = np.array([use.frame.turn for use in uses]).reshape(-1, 4)
         tools = np.array([(use.tool or Pose()).turn for use in uses]).reshape(-1, 4)
@@ -242,7 +243,7 @@ class _Writer:
         if target.counts:
             # motors go by whole steps
             unit, decimals = 1.0 / np.array(target.counts), 0
-        axes = self.plan.command[row : row + 1]
+        axes = self.held.own(self.plan.command[row : row + 1])
         axes = self.arm.from_level(axes) if self.path.from_level else axes
         numbers = axes[0, self.arm.columns] / unit
         made = [

@@ -13,6 +13,7 @@ from olp.files.config import beside, moved_by_change, tools_of, work_offsets_of
 from olp.files.kinematics.schema import (
     OWN_DIRECTIONS,
     ROTARY_NAMES,
+    TRACK_NUMBER,
     JointMachineFile,
     JointTable,
     kind_of,
@@ -20,9 +21,9 @@ from olp.files.kinematics.schema import (
 from olp.files.problems import config_error, validate
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, Reader, read_bytes
+from olp.kinematics.carried import Carried, carried_arm
 from olp.kinematics.coordinates import Coordinates
 from olp.kinematics.machine import JointMachine
-from olp.kinematics.parallel_arm import arm_of
 from olp.kinematics.pose_axes import posed
 from olp.kinematics.structure import Gauge, Joint, Leg, Platform, Structure
 
@@ -119,9 +120,11 @@ def _control(file: JointMachineFile, structure: Structure, path: PathLike) -> Ma
 
 def _arm(file: JointMachineFile, structure: Structure, path: PathLike) -> Machine | None:
     """What a reader of robot programs needs to know of an arm, None where the machine is none."""
-    if arm_of(structure) is None:
+    arm = carried_arm(structure)
+    if arm is None:
         return None
-    names = [name for name in structure.chain if name in file.axes]
+    _refuse_two_tracks(file, arm, path)
+    names = [name for name in structure.chain if structure.joints.get(name, arm.track) != arm.track]
     pulses = tuple(value for name in names if (value := file.axes[name].pulses_per_deg) is not None)
     if pulses and len(pulses) != len(names):
         lacking = ", ".join(name for name in names if file.axes[name].pulses_per_deg is None)
@@ -141,13 +144,26 @@ def _arm(file: JointMachineFile, structure: Structure, path: PathLike) -> Machin
         default_work_offset=file.job_defaults.work_offset,
         arm=True,
         third_level=file.kinematics.third_joint_level,
-        track=file.kinematics.track,
+        track=file.kinematics.track if arm.track is None else arm.track.direction,
+        track_errors=arm.track is not None,
         external={
             int(number): None if isinstance(value, str) else value
             for number, value in file.kinematics.external.items()
         },
         pulses_per_deg=pulses or None,
     )
+
+
+def _refuse_two_tracks(file: JointMachineFile, arm: Carried, path: PathLike) -> None:
+    """Raise ConfigError where the chain has a track, and [kinematics] says something else of it."""
+    stated = file.kinematics.track is not None, TRACK_NUMBER in file.kinematics.external
+    if arm.track is not None and any(stated):
+        key = "track" if stated[0] else f"external.{TRACK_NUMBER}"
+        raise config_error(
+            [(None, f"kinematics.{key} is stated, and {arm.track.name} of the chain is the first external "
+                    "axis, which carries the arm; expected one of both")],
+            str(path),
+        )  # fmt: skip
 
 
 def _joint(name: str, table: JointTable) -> Joint:

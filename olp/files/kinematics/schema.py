@@ -128,7 +128,8 @@ class KinematicsTable(Table):
     track: Direction | None = Field(
         default=None,
         description="the direction in which the first external axis of robot programs (E1, eax_a) carries "
-        "the arm, in mm, [X, Y, Z] in machine coordinates; the errors are those of the arm on its carriage",
+        "the arm, in mm, [X, Y, Z] in machine coordinates; the errors are those of the arm on its carriage. "
+        "A track with errors of its own is a linear axis of the chain instead, before the six of the arm",
     )
     external: dict[Text, float | Literal["apart"]] = Field(
         default={},

@@ -19,6 +19,7 @@ class External:
 
     def __init__(self, machine: Machine, remark: Callable[[str, int, str], None]) -> None:
         self._arm, self._track, self._declared = machine.arm, machine.track, machine.external
+        self._errors = machine.track_errors
         self._remark = remark
         self._at: dict[int, float] = {}
         self._frames: dict[tuple[str, float], Pose] = {}
@@ -51,22 +52,35 @@ class External:
         the target does not state where that is."""
         if self._track is None:
             return frame.pose
-        along = target.outer[0] if target.outer else ABSENT
-        if abs(along) >= ABSENT:
-            raise ProgramError(
-                "the arm is on a track, and this target does not state its first external axis, so it is "
-                "not known where the carriage is. State it in the target, or leave out track in [kinematics] "
-                "and count the work frames from the arm",
-                line=line,
-                code="OLP516",
-            )
-        what = "the arm is carried along its track: errors of the track itself are not corrected"
-        self._remark("track", target.line, what)
+        along = self._along(target, line)
+        if not self._errors:
+            what = "the arm is carried along its track: errors of the track itself are not corrected"
+            self._remark("track", target.line, what)
         key = frame.name, along
         if key not in self._frames:
             x, y, z = (a - along * b for a, b in zip(frame.pose.origin_mm, self._track, strict=True))
             self._frames[key] = Pose((x, y, z), frame.pose.turn)
         return self._frames[key]
+
+    def refuse_unplaced(self, target: Target, line: int) -> None:
+        """Raises ProgramError where the errors of a track count, and a target in joints does not state where
+        the carriage is."""
+        if self._errors:
+            self._along(target, line)
+
+    def _along(self, target: Target, line: int) -> float:
+        """Where the carriage is. Raises ProgramError where a target does not state it."""
+        along = target.outer[0] if target.outer else ABSENT
+        if abs(along) < ABSENT:
+            return along
+        without = "take the track out of the chain" if self._errors else "leave out track in [kinematics]"
+        raise ProgramError(
+            "the arm is on a track, and this target does not state its first external axis, so it is "
+            f"not known where the carriage is. State it in the target, or {without} "
+            "and count the work frames from the arm",
+            line=line,
+            code="OLP516",
+        )
 
 
 def differ(before: Target, after: Target) -> bool:

@@ -290,6 +290,7 @@ class RobotMoves:
             feed=feed if known else self._feed,
         )  # fmt: skip
         whole |= self.external.moves(self.targets[use.target], line)
+        self.external.refuse_unplaced(self.targets[use.target], line)
         pose = Pose() if tool is None else tool.pose
         self.uses.append(replace(use, tool=pose, straight=known, whole=whole))
         self.known, self._turn, self._rest, self._at = True, NO_TURN, (), None

@@ -192,21 +192,23 @@ class Places:
     def _outer(self, position: Position, beside: Sequence[Beside], line: int) -> tuple[float, ...]:
         """The base axes, or one that is not there, and behind them all others of the robot."""
         own = [] if position.numbers is None else [value for _, value in position.numbers[_NUMBERS:]]
+        machine = self.setup.machine
         bases: list[float] = []
         for kind, number in beside:
             if kind not in _BASES:
                 continue
             values, form = self._values(kind, number, line)
             # joints say where the arm is on its carriage, wherever that is
-            posed = position.header.form == b"RECTAN"
-            if posed and form != b"RECTAN" and any(values) and self.setup.machine.track is not None:
+            counts = machine.track_errors or position.header.form == b"RECTAN"
+            if counts and form != b"RECTAN" and any(values) and machine.track is not None:
                 raise not_read(
                     "the base axis of this move is in pulses; save the job in base coordinates "
                     "(///POSTYPE BASE), where it is in mm",
                     line,
                 )
             bases += values
-        if not bases and position.header.kind.upper() == b"ROBOT" and self.setup.machine.track is not None:
+        on_arm = position.header.kind.upper() == b"ROBOT"
+        if not bases and on_arm and machine.track is not None and not machine.track_errors:
             # it counts from the arm, wherever its carriage is
             bases = [0.0]
         if not bases and not own:

@@ -264,6 +264,13 @@ class _Reader:
                 line=line.line,
                 code="OLP533",
             )
+        if "E1" in found[0].turning and self.setup.machine.track is not None:
+            raise ProgramError(
+                f"the position P[{number}] of line {found[0].line} states E1 in deg, and E1 is the track of "
+                "the arm, in mm; expected a machine file without a track",
+                line=line.line,
+                code="OLP533",
+            )
         posed = "X" in axes and axes.keys() >= _POSE
         if not posed and ("X" in axes or not any(name[0] == "J" for name in axes)):
             raise ProgramError(

@@ -57,7 +57,7 @@ class Position:
 
     `frame` and `tool` are -1 for the active one. `axes` are bytes and values by their letters. `config` are
     the bytes of the configuration, and `others` is what else it states. `foreign` is the first value in a
-    unit that is not read."""
+    unit that is not read, and `turning` are the external axes in deg."""
 
     line: int
     span: Span
@@ -68,6 +68,7 @@ class Position:
     config: Span
     others: bytes
     foreign: str
+    turning: tuple[str, ...] = ()
 
     @property
     def outer(self) -> tuple[float, ...]:
@@ -152,7 +153,7 @@ def _position(data: bytes, match: re.Match[bytes], line: int) -> Position:
             others += data[group.start() : end]
     frame, config = _FRAME.search(data, *span), _CONFIG.search(data, *span)
     axes: dict[str, tuple[Span, float]] = {}
-    foreign = ""
+    foreign, turning = "", []
     for axis in _AXIS.finditer(data, *span):
         letter, stated, unit = axis.groups()
         name = letter.decode()
@@ -160,8 +161,11 @@ def _position(data: bytes, match: re.Match[bytes], line: int) -> Position:
             axes[name] = axis.span(2), value
         if unit is not None and not foreign and unit not in _UNITS.get(name, _EITHER):
             foreign = axis[0].decode("latin-1")
+        if name[0] == "E" and unit == b"deg":
+            turning.append(name)
     used = [-1 if frame is None or frame[k] == b"F" else int(frame[k]) for k in (1, 2)]
     return Position(
         line, match.span(), match.span(1), used[0], used[1], axes,
         (span[0], span[0]) if config is None else config.span(1), b"".join(others.split()), foreign,
+        tuple(turning),
     )  # fmt: skip
