@@ -692,6 +692,36 @@ def test_external_axes_that_are_declared_keep_their_words(language: str, tmp_pat
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("kind", ["L", "C"])
+def test_another_motion_group_is_not_led_to_its_end_early(kind: str, tmp_path: Path) -> None:
+    """Parts of a move would state where a positioner is at the end of it. An arc that needs some is refused."""
+    machine, far = stated(arm_files(tmp_path), "tp"), JOINTS + np.array([25, 5, -5, 5, -4, 6])
+    steps = [("P", JOINTS), ("L", JOINTS + (far - JOINTS) * [0.5, 0.9, 0.5, 0.5, 0.5, 0.5]), ("L", far)]
+    plain = tp(steps)
+    if kind == "C":
+        plain = plain.replace(b"   2:L P[2] 250mm/sec CNT60    ;\n", b"")
+        plain = plain.replace(b"   3:L P[3] 250", b"   2:C P[2]\n     : P[3] 250")
+        turn = re.findall(rb"W = .*deg", plain)
+        plain = plain.replace(turn[1], turn[0]).replace(turn[2], turn[0])
+
+    def text(*angles: float) -> bytes:
+        pieces = plain.split(b" deg\n};")
+        group = " deg\n   GP2:\n\tUF : 0, UT : 1,\n\tJ1= {} deg,\tJ2= 0.000 deg\n}};"
+        groups = [group.format(angle).encode() for angle in angles]
+        return b"".join(piece + more for piece, more in zip(pieces, [*groups, b""], strict=True))
+
+    still = olp.correct_joints(text(90.0, 90.0, 90.0), machine)
+    assert any("other motion groups are kept as written" in str(one) for one in still.report["findings"])
+    assert still.data.count(b"P[") > 2 * len(steps) + 1
+    turning = text(90.0, 90.0, 30.0)
+    if kind == "C":
+        with pytest.raises(ProgramError, match="belongs to all of it"):
+            olp.correct_joints(turning, machine)
+        return
+    assert olp.correct_joints(turning, machine).data.count(b"J1= 30.0 deg") == 1
+
+
+@pytest.mark.slow
 def test_shifts_of_external_axes_are_refused_where_poses_count_from_them(tmp_path: Path) -> None:
     text = rapid([("P", JOINTS), ("L", JOINTS + 1.0)]).replace(b"  MoveL", b"  EOffsOn DATA;\n  MoveL")
     for line in ("", 'external = { 1 = "apart" }'):

@@ -69,6 +69,8 @@ class _Reader:
         self.copied: list[str] = []
         self.frames: dict[tuple[int, Pose | None], Located] = {}
         self.tools: dict[tuple[int, Pose | None], Tool] = {}
+        #: what other motion groups are at, as text
+        self.beside = b""
         #: configurations and other groups by their text
         self.configs: dict[tuple[bytes, bytes], int] = {}
         self.blocks: list[tuple[bool, int]] = []
@@ -148,6 +150,7 @@ class _Reader:
         shift = self._shift(move, position)
         begin = self.data.index(b"[", line.first) + 1
         place = begin, self.data.index(b"]", begin)
+        whole = self._groups_move(position, line)
         if position is not None and "X" not in position.axes:
             self.moves.joint_move(line.line, lambda: self._joints(line, move, number, position, place))
             return
@@ -162,7 +165,7 @@ class _Reader:
         use = self._use(line, number, position, place, shift, along_tool=along_tool)
         self.moves.move(
             line.line, use, self._frame(position, line), self._tool(position, line), move.feed,
-            straight=move.straight, whole=move.whole,
+            straight=move.straight, whole=whole or move.whole,
         )  # fmt: skip
         if move.skips:
             self.moves.known = False
@@ -172,13 +175,14 @@ class _Reader:
         self._begin(line, move, number)
         if move.register or move.offset is not None or move.skips:
             raise not_read("an arc to a register, with an offset or with Skip is not read", line.line)
-        begin, ends = line.first, []
+        begin, ends, whole = line.first, [], False
         for own in (via_number, number):
             begin = self.data.index(b"[", begin) + 1
             position = self._position(own, line)
             if "X" not in position.axes:
                 raise not_read(f"P[{own}] of this arc is in joints; post it as a position", line.line)
             span = begin, self.data.index(b"]", begin)
+            whole |= self._groups_move(position, line)
             use = self._use(line, own, position, span, ZERO)
             ends.append((use, self._frame(position, line), self._tool(position, line)))
         (via, *place), (end, frame, tool) = ends
@@ -186,8 +190,21 @@ class _Reader:
             raise not_read("via point and end of this arc have different frames or tools", line.line)
         self.moves.arc(
             line.line, via, end, frame, tool, move.feed, turned_by_via=True,
-            whole=move.whole,
+            whole=whole or move.whole,
         )  # fmt: skip
+
+    def _groups_move(self, position: Position | None, line: Line) -> bool:
+        """Whether other motion groups move along with a move, or may: parts would lead them to its end before
+        the move ends."""
+        others = b"" if position is None else position.others
+        moved, self.beside = others != self.beside, others
+        if others:
+            what = (
+                "other motion groups are kept as written: they are not corrected, and positions of the first "
+                "do not count from them"
+            )
+            self.moves.remark("groups", line.line, what)
+        return moved
 
     def _use(
         self, line: Line, number: int, position: Position, place: Span, shift: Vector, *,
