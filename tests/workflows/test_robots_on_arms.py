@@ -694,7 +694,7 @@ def test_external_axes_that_are_declared_keep_their_words(language: str, tmp_pat
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["L", "C"])
 def test_another_motion_group_is_not_led_to_its_end_early(kind: str, tmp_path: Path) -> None:
-    """Parts of a move would state where a positioner is at the end of it. An arc that needs some is refused."""
+    """Parts of a move would state where a positioner is at its end. An arc that needs parts is refused."""
     machine, far = stated(arm_files(tmp_path), "tp"), JOINTS + np.array([25, 5, -5, 5, -4, 6])
     steps = [("P", JOINTS), ("L", JOINTS + (far - JOINTS) * [0.5, 0.9, 0.5, 0.5, 0.5, 0.5]), ("L", far)]
     plain = tp(steps)
