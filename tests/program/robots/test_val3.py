@@ -596,4 +596,40 @@ def test_a_task_that_moves_is_corrected_by_itself(bent: Path) -> None:
     assert any("begins depends on the run" in what for what in told)
     assert result.report["moves"]["corrected"] == 2
     with pytest.raises(ProgramError, match="correct it by itself"):
-        olp.correct(made(['taskCreate "c",10,cycle()'], POINTS, TASK), bent)
+        olp.correct(made(['taskCreateSync "c",0.1,bLate,cycle()'], POINTS, TASK), bent)
+
+
+def test_the_only_task_that_moves_is_followed(bent: Path) -> None:
+    """From where it begins, with its arguments. Not where there are two, or where it may begin again."""
+    lines = ['taskCreate "w",10,watch()', 'taskCreate "c",10,cycle()', "wait(false)"]
+    run = ["movej(pPoint[0],tGrip,mFast)", "movel(pPoint[1],tGrip,mFast)", "movel(pPoint[2],tGrip,mFast)"]
+    result = olp.correct(made(lines, POINTS, pgx("cycle", *run), STILL_TASK), bent)
+    called = olp.correct(made(["call watch()", "call cycle()"], POINTS, pgx("cycle", *run), STILL_TASK), bent)
+    assert result.report["moves"]["corrected"] == 3
+    assert result.report["moves"]["split"] == called.report["moves"]["split"] > 0
+    assert result.data[result.data.index(b"<Datas>") :] == called.data[called.data.index(b"<Datas>") :]
+    assert any("cycle is followed from here on" in one.message for one in result.findings)
+    for more in ([lines[1]], ["if nX>1", lines[1], "endIf"]):
+        with pytest.raises(ProgramError, match="correct it by itself"):
+            olp.correct(made([*(lines if len(more) == 1 else []), *more], POINTS, TASK, STILL_TASK), bent)
+    with pytest.raises(ProgramError, match="correct it by itself"):
+        olp.correct(made([lines[1], "resetMotion()"], POINTS, TASK), bent)
+
+
+@pytest.mark.parametrize("where", ["watch", "start"])
+def test_what_another_task_may_change_is_not_known(where: str, bent: Path) -> None:
+    """Also behind a statement of the task itself that gives it numbers."""
+    change = "pNear.trsf.x=pNear.trsf.x+1"
+    lines = [
+        'taskCreate "w",10,watch()',
+        'taskCreate "c",10,cycle()',
+        change if where == "start" else "delay(1)",
+    ]
+    watch = pgx("watch", change if where == "watch" else "delay(1)")
+    run = ["pNear.trsf={12,0,5,180,0,0}", "movel(pNear,tGrip,mFast)", "movel(pPoint[2],tGrip,mFast)"]
+    near = datum("pNear", "pointRx", POINTS[0]) + "  </Datas>"
+    text = made(lines, POINTS, pgx("cycle", *run), watch).replace(b"  </Datas>", near.encode())
+    result = olp.correct(text, bent)
+    assert result.report["moves"]["corrected"] == 1
+    says = "may change it at any time" if where == "watch" else "changes it meanwhile"
+    assert any(says in one.message for one in result.findings)

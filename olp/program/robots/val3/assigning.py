@@ -38,6 +38,8 @@ def assign(state: State, line: Line, scope: Scope) -> None:
     value = (-1, -1) if match[4] != b"=" else (line.begin + match.start(5), line.begin + match.end(5))
     if not _TAKES[thing.kind](state, thing, fields, value, scope):
         thing.why = f"it is computed in line {line.line}"
+    if (why := state.beside.get(thing.name)) and state.things.get((thing.name, thing.key)) is thing:
+        thing.why = why
 
 
 def _given(thing: Thing, slots: list[Slot | None]) -> bool:

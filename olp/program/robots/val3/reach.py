@@ -10,11 +10,14 @@ from olp.core.projects import FileLines
 from olp.program.robots.line import Line
 from olp.program.robots.val3.code import Routine, lines_in
 from olp.program.robots.val3.files import Application
-from olp.program.robots.val3.table import STILL
+from olp.program.robots.val3.table import AWAY, STILL
 from olp.program.robots.val3.values import REFERENCE, arguments
 
 _MOVES = pattern(rb"(?i)\bmove[ljc]\s*\(")
 _CALLED = pattern(rb"(?is)call\s+([A-Za-z_][\w:]*)\s*\((.*)\)")
+_CREATES = pattern(rb"(?i)taskCreate(Sync)?\b")
+#: A statement that begins a task: what it runs, and what it gives to that.
+TASK = pattern(rb"(?is)taskCreate(?:Sync)?\b[^,]*,.*?,\s*([A-Za-z_][\w:]*)\s*\((.*)\)")
 _SET = pattern(rb"([A-Za-z_]\w*)\s*(?:\[[^\[\]]*\])?\s*(?:\.\s*\w+\s*)*=(?!=)")
 #: What gets a value, with its index.
 _GIVEN = pattern(rb"[A-Za-z_]\w*\s*(?:\[([^\[\]]*)\]\s*)?(?:\.\s*\w+\s*)*=(?!=)")
@@ -36,7 +39,8 @@ _READS = STILL | frozenset(
 
 class Reach:
     """What the programs of an application do, whatever the run. `elsewhere` are data that programs which are
-    not followed give other values, and where."""
+    not followed give other values, and where. `beside` are those that tasks may change at any time. `task` is
+    the statement that begins the only task which moves the robot, where nothing else does: it is followed."""
 
     def __init__(self, application: Application, data: bytes) -> None:
         self._files, self.routines = FileLines(data), application.routines
@@ -49,7 +53,11 @@ class Reach:
             self._calls[name] = [called for line in lines if (called := self._called(line)) is not None]
         self._spread()
         first = application.first
+        self.task = None if first is None else self._only_mover(first)
+        if first is not None and self.task is not None:
+            self._calls[first.name].append(self._begun_by(self.task).name)  # type: ignore[union-attr]
         self._count = self._counted(first)
+        self.beside = self._beside(first)
         self.elsewhere: dict[str, str] = {}
         for name, routine in self.routines.items():
             if routine is first or self._count.get(name):
@@ -70,6 +78,60 @@ class Reach:
         if match is None or (name := match[1].decode("latin-1")) not in self.routines:
             return None
         return name
+
+    # -- tasks ---------------------------------------------------------------------------------------
+
+    def _begun_by(self, line: Line) -> Routine | None:
+        """The program that a task runs; None for one that is not in this application."""
+        match = TASK.fullmatch(line.text)
+        return None if match is None else self.routines.get(match[1].decode("latin-1"))
+
+    def moves_beside(self, line: Line) -> bool:
+        """Whether a statement begins a task that may move the robot beside the programs that are followed."""
+        if line is self.task or not _CREATES.match(line.text):
+            return False
+        routine = self._begun_by(line)
+        return routine is None or self.moving(routine)
+
+    def _only_mover(self, first: Routine) -> Line | None:
+        """The statement of the first program that begins the only task which moves the robot; None where
+        another one may, or it cannot be followed as a call."""
+        self.task = None
+        every = [line for routine in self.routines.values() for line in lines_in(routine.nodes)]
+        movers = [line for line in every if self.moves_beside(line)]
+        begins = [node for node in first.nodes if isinstance(node, Line) and movers == [node]]
+        routine = self._begun_by(begins[0]) if begins else None
+        match = _CREATES.match(begins[0].text) if begins else None
+        if routine is None or match is None or match[1] or any(p[2] for p in routine.parameters):
+            return None
+        own = {routine.name, *self._counted(routine)}
+        others = (line for r in self.routines.values() if r.name not in own for line in lines_in(r.nodes))
+        away = any(not AWAY.isdisjoint(_words(line)) for line in others)
+        return None if away or self._moving[first.name] else begins[0]
+
+    def _beside(self, first: Routine | None) -> dict[str, str]:
+        """The data that tasks change, or the first program while it is followed through one, and where."""
+        found: dict[str, str] = {}
+        for routine in self.routines.values():
+            for line in lines_in(routine.nodes):
+                begun = self._begun_by(line) if _CREATES.match(line.text) else None
+                if begun is not None and line is not self.task:
+                    match = TASK.fullmatch(line.text)
+                    assert match is not None
+                    for name in self._passed(match[2], begun.name):
+                        found.setdefault(
+                            name, f"the task of {self._shown(line.line)} may change it at any time"
+                        )
+        if first is not None and self.task is not None:
+            behind = [line for line in lines_in(first.nodes) if line.begin > self.task.begin]
+            for name in self.changed(behind) - set(first.locals):
+                what = (
+                    f"the program that begins the task of {self._shown(self.task.line)} changes it meanwhile"
+                )
+                found.setdefault(name, what)
+        return found
+
+    # -- changes -------------------------------------------------------------------------------------
 
     def _own(self, line: Line) -> set[str]:
         """The names that a statement gives a value itself."""
@@ -115,12 +177,16 @@ class Reach:
 
     def _through(self, line: Line, called: str) -> set[str]:
         """The names of the caller that a call gives other values."""
-        parameters = self.routines[called].parameters
-        found = self._sets[called] - {name for name, _, _ in parameters}
         match = _CALLED.fullmatch(line.text)
         assert match is not None
-        for (name, _, by_reference), (a, b) in zip(parameters, arguments(match[2], 0), strict=False):
-            argument = REFERENCE.fullmatch(match[2][a:b])
+        return self._passed(match[2], called)
+
+    def _passed(self, given: bytes, called: str) -> set[str]:
+        """The names that a program gives other values which has `given` arguments."""
+        parameters = self.routines[called].parameters
+        found = self._sets[called] - {name for name, _, _ in parameters}
+        for (name, _, by_reference), (a, b) in zip(parameters, arguments(given, 0), strict=False):
+            argument = REFERENCE.fullmatch(given[a:b])
             if by_reference and name in self._sets[called] and argument is not None:
                 found.add(argument[1].decode("latin-1"))
         return found
@@ -176,6 +242,11 @@ class Reach:
     def repeated(self, routine: Routine) -> bool:
         """Whether a program is called several times."""
         return self._count.get(routine.name, 0) > 1
+
+
+def _words(line: Line) -> list[bytes]:
+    """The names before brackets in a statement, in small letters."""
+    return [match[1].lower() for match in _NAMED.finditer(line.text)]
 
 
 def _inside(text: bytes, begin: int) -> bytes:

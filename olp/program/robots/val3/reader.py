@@ -22,14 +22,13 @@ from olp.program.robots.val3.code import Block, Node, Routine, lines_in, word_of
 from olp.program.robots.val3.files import Application, application
 from olp.program.robots.val3.moving import Moving
 from olp.program.robots.val3.places import Places
-from olp.program.robots.val3.reach import Reach
+from olp.program.robots.val3.reach import TASK, Reach
 from olp.program.robots.val3.state import Scope, State
 from olp.program.robots.val3.values import CALL, Thing, balanced
 
 MOVE = pattern(rb"(?is)(?:[A-Za-z_][^={}()\"]*=\s*)?(move[ljc])\s*\((.*)\)")
 _HAS_MOVE = pattern(rb"(?i)\bmove[ljc]\s*\(")
 _CALLED = pattern(rb"(?is)call\s+([A-Za-z_][\w:]*)\s*\((.*)\)")
-_TASK = pattern(rb"(?is)taskCreate(?:Sync)?\b[^,]*,.*?,\s*([A-Za-z_][\w:]*)\s*\(.*\)")
 _LINK = pattern(rb"(?is)link\s*\((.*)\)")
 _LEADS = pattern(rb"(?i)(?:break|continue|wait|exit)\b")
 _ALTERED = pattern(rb"(?i)alter(?!\w*[ \t]*=)\w*\s*\(")
@@ -52,7 +51,7 @@ class _Reader:
         self.data, self._files = data, FileLines(data)
         self.application: Application = application(data)
         self.reach = Reach(self.application, data)
-        self.state = State(data, self.application.data, self.reach.elsewhere)
+        self.state = State(data, self.application.data, self.reach.elsewhere, self.reach.beside)
         self.moves = RobotMoves(data, setup, "world")
         places = Places(self.state, self.moves.frames)
         self.moving = Moving(data, self.state, places, self.moves)
@@ -73,7 +72,7 @@ class _Reader:
             self.count = max(len(lines_in(first.nodes)), 1)
             others = (r for r in self.application.routines.values() if r is not first)
             self.alone = not any(
-                map(self._moves_beside, (line for r in others for line in lines_in(r.nodes)))
+                map(self.reach.moves_beside, (line for r in others for line in lines_in(r.nodes)))
             )
             self._nodes(first.nodes, scope, 0)
         if self.refusals:
@@ -124,7 +123,7 @@ class _Reader:
         lines = block.lines()
         changed = self.reach.changed(lines)
         moving = any(self.reach.moves(line) for line in lines)
-        self.alone &= not any(map(self._moves_beside, lines))
+        self.alone &= not any(map(self.reach.moves_beside, lines))
         begin = block.branches[0][0]
         why = (
             f"it gets another value in the block of line {self._shown(begin.line)}, so it depends on the run"
@@ -166,7 +165,7 @@ class _Reader:
         elif call is not None:
             self._call(line, call[1].decode("latin-1"), line.begin + call.start(2), scope, depth)
         elif word_of(text).startswith("taskcreate"):
-            self._task(line)
+            self._task(line, scope, depth)
         elif is_assignment(text):
             assign(self.state, line, scope)
             self._instructions(line, scope)
@@ -186,27 +185,21 @@ class _Reader:
         if match is not None and match[1].lower() in table.AWAY:
             self.moves.known = False
 
-    def _moves_beside(self, line: Line) -> bool:
-        """Whether a statement begins a task that may move the robot."""
-        if not word_of(line.text).startswith("taskcreate"):
-            return False
-        routine = self._task_of(line)
-        return routine is None or self.reach.moving(routine)
-
-    def _task_of(self, line: Line) -> Routine | None:
-        """The program that a task runs; None for one that is not in this application."""
-        match = _TASK.fullmatch(line.text)
-        return None if match is None else self.application.routines.get(match[1].decode("latin-1"))
-
-    def _task(self, line: Line) -> None:
-        if not self._moves_beside(line):
+    def _task(self, line: Line, scope: Scope, depth: int) -> None:
+        match = TASK.fullmatch(line.text)
+        name = "" if match is None else match[1].decode("latin-1")
+        if match is not None and line is self.reach.task:
+            what = f"{name} is followed from here on: no other task moves the robot"
+            self.moves.remark("task", line.line, what)
+            self._call(line, name, line.begin + match.start(2), scope, depth)
+        if not self.reach.moves_beside(line):
             return
-        self.alone, routine = False, self._task_of(line)
+        self.alone = False
         what = "another task may move the robot at the same time"
-        if routine is not None:
+        if name in self.application.routines:
             what = (
-                f"{routine.name} is a task of its own, which moves the robot; correct it by itself, with "
-                f"{routine.name}.pgx in place of this program"
+                f"{name} is a task of its own, which moves the robot; correct it by itself, with "
+                f"{name}.pgx in place of this program"
             )
         raise DecidedInRun(what, line=line.line, code="OLP512")
 

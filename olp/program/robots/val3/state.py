@@ -24,11 +24,13 @@ class Scope:
 
 class State:
     """The values of all data. `elsewhere` are names that programs give other values that are not followed,
-    and where. `through` are the names by which numbers were taken, by the bytes of these: each with its
-    program, empty for data of the application."""
+    and where, `beside` those that other tasks may change at any time. `through` are the names by which
+    numbers were taken, by the bytes of these: each with its program, empty for data of the application."""
 
-    def __init__(self, data: bytes, declared: Iterable[Datum], elsewhere: dict[str, str]) -> None:
-        self.data, self.elsewhere = data, elsewhere
+    def __init__(
+        self, data: bytes, declared: Iterable[Datum], elsewhere: dict[str, str], beside: dict[str, str]
+    ) -> None:  # fmt: skip
+        self.data, self.elsewhere, self.beside = data, elsewhere | beside, beside
         self.declared: dict[str, Datum] = {}
         for datum in declared:
             if datum.name in self.declared:

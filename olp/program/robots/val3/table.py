@@ -47,6 +47,8 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"here, herej": (_X, "a move there goes nowhere"),
     b"waitEndMove, open, close, delay, wait, popUpMsg": (_X, ""),
     b"alterMovej, alterMovel, alterMovec": (_NO, "is a path that is altered in the run"),
-    b"taskCreate": (_R, "correct a program that moves by itself; moves beside it are at their ends"),
+    b"taskCreate": (
+        _R, "the only task that moves is followed; correct others alone, moves beside them are at their ends"
+    ),
     b"millimeterUnit": (_NO, "with the value false: lengths in inch"),
 }  # fmt: skip
