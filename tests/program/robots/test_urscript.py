@@ -160,3 +160,37 @@ def test_moves_whose_tool_the_run_decides_are_left(lines: str, moved: str, tmp_p
     text = olp.correct(lines.encode(), path).data.decode()
     own = [line for line in text.splitlines() if line.startswith("movel")]
     assert [str(int("0.09990000" in line)) for line in own] == list(moved)
+
+
+@pytest.mark.parametrize(
+    ("between", "known"),
+    [
+        ("grip(1)", True),
+        ("x=grip(1)", True),
+        ("x[0]=grip(1)", True),
+        ("if not(grip(0)):\nsleep(1)\nend", True),
+        ("h=run watch()\njoin h", True),
+        ("x=server.move_box(1)", True),
+        ("textmsg(to_str(grip(1)))", True),
+        ("go()", False),
+        ("x=get_list_length(go())", False),
+        ("x[0]=go()", False),
+        ("textmsg(to_str(go()))", False),
+        ("if not(go()):\nsleep(1)\nend", False),
+        ("h=run leave()\njoin h", False),
+        ("library()", False),
+    ],
+)
+def test_a_function_that_moves_nothing_leaves_the_robot_where_it_is(
+    between: str, known: bool, bent: Path
+) -> None:
+    """Whatever it calls: the move behind it is split. One that may move, or is not known, is not."""
+    functions = (
+        'def grip(n):\nsocket_send_line("GTO")\nwhile read_input_boolean_register(n):\nsync()\nend\n'
+        "return wait()\nend\ndef wait():\nsleep(0.1)\nreturn 1\nend\nthread watch():\nwait()\nend\n"
+        "def go():\nreturn there()\nend\ndef there():\nmovej([0,0,0,0,0,0])\nend\n"
+        "thread leave():\ngo()\nend\n"
+    )
+    moves = [f"movel(pose_trans(p[0.3,0.25,-0.3,0,0,0],p[{x},{x},0,2.2,2.2,0.1]))" for x in (-0.06, 0.06)]
+    text = "\n".join(["def a():", "set_tcp(p[0,0,0.1,0,0,0])", functions, moves[0], between, moves[1], "end"])
+    assert (olp.correct(text.encode(), bent).report["moves"]["split"] == 1) == known

@@ -20,6 +20,7 @@ from olp.program.robots.frames import Located, Tool
 from olp.program.robots.moves import NAN, DecidedInRun, RobotMoves, take_all
 from olp.program.robots.poses import Pose, of_vector
 from olp.program.robots.targets import NOWHERE, Span, Use
+from olp.program.robots.urscript.calls import Calls
 from olp.program.robots.urscript.table import LEFT, TABLE
 from olp.program.robots.urscript.text import Line, lines_of
 from olp.program.robots.urscript.tools import Tools
@@ -90,7 +91,7 @@ class _Reader:
     def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
         every = [line for line in lines_of(self.data) if line.text.strip()]
         self._assignments(every)
-        self.tools = Tools(every, self._tcp)
+        self.tools, self.calls = Tools(every, self._tcp), Calls(every)
         take_all(every, self._statement, self.moves, self.refusals, options)
         self.moves.hold_mentioned(self._statements(every))
         return self.moves.program(dialect, words=words)
@@ -143,7 +144,7 @@ class _Reader:
                 )
             self._block(line, word)
             return
-        match = _ASSIGNED.fullmatch(text)
+        match, element = _ASSIGNED.fullmatch(text), _ELEMENT.match(text)
         call = _CALL.fullmatch(text)
         row = TABLE.get(word)
         if word in LEFT:
@@ -158,7 +159,9 @@ class _Reader:
             self.tools.set(line, self._tcp(call[2]))
         elif match is not None:
             self._value(line, match[2])
-        elif row is None or row[0] is not Support.UNCHANGED:
+        elif element is not None:
+            self._value(line, text[element.end() :])
+        elif row is None or row[0] is not Support.UNCHANGED or self.calls.may_move(text):
             self._call(line)
 
     def _value(self, line: Line, value: bytes) -> None:
@@ -167,10 +170,14 @@ class _Reader:
         if moving is not None:
             what = f"{moving[0].decode()} in a value is not read; write the move in a line of its own"
             raise DecidedInRun(what, line=line.line, code="OLP512")
-        if b"(" in value and not re.match(rb"\s*(?:pose_\w+|get_\w+|read_\w+|d2r|r2d|floor|sqrt)\(", value):
+        if b"(" in value:
             self._call(line)
 
     def _call(self, line: Line) -> None:
+        """A statement that calls functions, or whose word is not known."""
+        self.tools.called(line.text)
+        if self.calls.still(line.text):
+            return
         name = _WORDS.search(line.text)
         if name is None or name[0] not in self.defined:
             shown = line.text.strip()[:40].decode("latin-1")
@@ -179,13 +186,12 @@ class _Reader:
         if name is not None and name[0] == b"force_mode":
             what = "from here on forces lead the robot along some axes, which no target states"
             self.moves.remark("force", line.line, what)
-        self.tools.called(line.text)
         self.moves.known = False
 
     def _block(self, line: Line, word: bytes) -> None:
         if word not in (b"def", b"thread") and self.defined & set(_WORDS.findall(line.text)):
             self.tools.called(line.text)
-            self.moves.known = False
+            self.moves.known &= not self.calls.own_may_move(line.text)
         self.tools.block(line, word)
         if word in (b"elif", b"else", b"end"):
             moved = bool(self.blocks) and self.blocks[-1][1] != self.moves.count

@@ -32,7 +32,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"set_tcp": (_R, "the tool from here on; moves whose tool depends on the run are left as written"),
     b"def, thread": (_R, "where its first move comes from is not known: it is corrected at its end"),
     b"if, while, for": (_R, "behind moves that may not run, the next one is corrected at its end"),
-    b"a call": (_R, "may move: the next move is corrected at its end"),
+    b"a call": (_R, "may move, where nothing shows that it does not: the next move is corrected at its end"),
     **{word: (_R, f"left as written, as it {why}") for word, why in LEFT.items()},
     b"force_mode": (_R, "targets behind it are corrected; forces lead the robot along some axes"),
     **dict.fromkeys((b"teach_mode", b"freedrive_mode"), (_R, _BY_HAND)),
