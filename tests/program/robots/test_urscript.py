@@ -194,3 +194,47 @@ def test_a_function_that_moves_nothing_leaves_the_robot_where_it_is(
     moves = [f"movel(pose_trans(p[0.3,0.25,-0.3,0,0,0],p[{x},{x},0,2.2,2.2,0.1]))" for x in (-0.06, 0.06)]
     text = "\n".join(["def a():", "set_tcp(p[0,0,0.1,0,0,0])", functions, moves[0], between, moves[1], "end"])
     assert (olp.correct(text.encode(), bent).report["moves"]["split"] == 1) == known
+
+
+A, B = "p[0.1,0.1,0.1,0,0,0]", "p[0.4,0.1,0.1,0,0,1.570796326794897]"
+IN_F, TO_P = "movel(pose_trans(F,p[0.1,0.2,-0.3,0,0,0]))", "movel(P)"
+#: The place of a target that is corrected in the frame A, and in B, whose second axis is against X.
+IN_A, IN_B = "p[0.09990000,0.2,", "p[0.1,0.20010000,"
+
+
+@pytest.mark.parametrize(
+    ("lines", "wanted"),
+    [
+        # the last value before the move, as posts write their frames
+        (["global F=" + A, "F=" + B, IN_F, "F=" + A, IN_F], [IN_B, IN_A]),
+        (["F=" + A, "if x:", "F=" + B, IN_F, "else:", IN_F, "end", IN_F], [IN_B, IN_A, IN_F]),
+        (["F=" + A, "if x:", "F=" + B, "else:", "F=" + B, "end", IN_F], [IN_F]),
+        (["F=" + A, "while x:", IN_F, "F=" + B, IN_F, "end", IN_F, "F=" + B, IN_F], [IN_F, IN_B, IN_F, IN_B]),
+        # what another function gives, or this one when it runs again
+        (["F=" + A, "def g():", "F=" + B, "end", IN_F], [IN_F]),
+        (["F=" + A, "F=" + B, "def g():", IN_F, "end", IN_F, "g()"], [IN_F, IN_B]),
+        (["def g():", SET.strip(), "F=" + A, "g()", IN_F, "F=" + B, IN_F, "end", "g()"], [IN_F, IN_F]),
+        (["def g(F):", IN_F, "end", "F=" + B, IN_F, "g(F)"], [IN_F, IN_B]),
+        (["def g():", "local F=" + A, IN_F, "end", "local F=" + B, IN_F, "g()"], [IN_A, IN_B]),
+        (["F=" + A, "F=" + B, "F[0]=x", IN_F], [IN_F]),
+        # targets with two values, and one that is a frame as well
+        (
+            ["P=p[0.1,0.1,-0.1,0,0,0]", TO_P, "P=p[0.1,0.2,-0.3,0,0,0]", TO_P],
+            ["P=p[0.09990000,0.1,", TO_P, "P=" + IN_A, TO_P],
+        ),
+        (["F=p[0.1,0.1,-0.01,0,0,0]", "movel(F)", IN_F], ["movel(F_olp1)", IN_A]),
+    ],
+)
+def test_the_value_of_a_name_is_the_one_that_holds_there(
+    lines: list[str], wanted: list[str], tmp_path: Path
+) -> None:
+    """Where the run decides about it a move stays as it is written."""
+    recipe = Recipe(controller="urscript", tools={}, job_defaults={}, work_offsets={})
+    path = machines.shift_machine(tmp_path, (100.0, 0.0, 0.0), recipe=recipe)
+    text = "\n".join(["def a():", "set_tcp(p[0,0,0.1,0,0,0])", *lines, MOVE + "end", ""])
+    result = olp.correct(text.encode(), path)
+    assert result.report["verdict"]["ok"]
+    found = [line for line in result.data.decode().splitlines() if line.startswith(("movel", "P="))]
+    assert len(found) == len(wanted) + 1
+    for line, part in zip(found, wanted, strict=False):
+        assert part in line

@@ -74,6 +74,15 @@ class Calls:
         waits = _WAITS.match(text)
         return any(map(self._may, _called(text) if waits is None else self._threads.get(waits[1], {b""})))
 
+    def recursive(self, name: bytes) -> bool:
+        """Whether a function may call itself."""
+        found, waiting = set[bytes](), [name]
+        while waiting:
+            called = self._calls.get(waiting.pop(), set()) - found
+            found |= called
+            waiting += called
+        return name in found
+
     def still(self, text: bytes) -> bool:
         """Whether a statement is known to move nothing: what it calls, or the threads that it waits for."""
         return (b"(" in text or _WAITS.match(text) is not None) and not self.may_move(text)

@@ -13,7 +13,6 @@ from math import degrees
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.patterns import pattern
-from olp.core.values import dataclass
 from olp.program.dialect import Dialect, Options, Support
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
@@ -21,6 +20,7 @@ from olp.program.robots.moves import NAN, DecidedInRun, RobotMoves, take_all
 from olp.program.robots.poses import Pose, of_vector
 from olp.program.robots.targets import NOWHERE, Span, Use
 from olp.program.robots.urscript.calls import Calls
+from olp.program.robots.urscript.named import ASSIGNED, ELEMENT, Names
 from olp.program.robots.urscript.table import LEFT, TABLE
 from olp.program.robots.urscript.text import Line, lines_of
 from olp.program.robots.urscript.tools import Tools
@@ -35,8 +35,6 @@ _JOINTS = pattern(rb"\s*(?:\[[^\[\]]*\]|d2r\(.*\))\s*")
 #: A pose that is reached near given joints.
 _INVERSE = pattern(rb"\s*get_inverse_kin\((.*)\)\s*")
 _NEAR = pattern(rb"\s*(?:qnear\s*=(?!=))?\s*(.*?)\s*")
-_ASSIGNED = pattern(rb"\s*(?:(?:global|local)\s+)?([A-Za-z_]\w*)\s*=(?!=)\s*(.*?)\s*")
-_ELEMENT = pattern(rb"\s*([A-Za-z_]\w*)\s*\[[^\]]*\]\s*=(?!=)")
 _DEFINED = pattern(rb"(?m)^[ \t]*(?:def|thread)[ \t]+(\w+)")
 #: Words of moves, which a line that begins a block must not have.
 _MOVING = pattern(rb"\b(?:opti)?(?:move|servo|speed)[jlpc]\b")
@@ -53,13 +51,9 @@ _WORDS = pattern(rb"[A-Za-z_]\w*")
 _MM_PER_M = 1000.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Named:
-    """A pose or joint values with a name: the line, the bytes of the value and of the whole statement."""
-
-    line: int
-    value: Span
-    statement: Span
+def _states(value: bytes) -> bool:
+    """Whether a value is a pose or joints with numbers."""
+    return POSE.fullmatch(value) is not None or JOINTS.fullmatch(value) is not None
 
 
 def read(
@@ -76,13 +70,9 @@ class _Reader:
     def __init__(self, data: bytes, setup: Setup) -> None:
         self.data, self.setup = data, setup
         self.moves = RobotMoves(data, setup, "base", _MM_PER_M)
-        self.poses: dict[bytes, _Named] = {}
-        self.assigned: dict[bytes, int] = {}
         self.targets: dict[Span, int] = {}
         #: joints near which poses are reached by a movej, by the places of these
         self.near: dict[int, tuple[float, ...]] = {}
-        #: names of joint values
-        self.joints: set[bytes] = set()
         #: functions of the text
         self.defined = set(_DEFINED.findall(data))
         self.blocks: list[tuple[bytes, int]] = []
@@ -90,39 +80,21 @@ class _Reader:
 
     def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
         every = [line for line in lines_of(self.data) if line.text.strip()]
-        self._assignments(every)
-        self.tools, self.calls = Tools(every, self._tcp), Calls(every)
+        self.calls = Calls(every)
+        self.names = Names(every, _states, self.calls.recursive)
+        given = [match for line in every if (match := ASSIGNED.fullmatch(line.text)) is not None]
+        self.joints = {match[2] for match in given if match[3][:1] == b"["}
+        self.tools = Tools(every, lambda text: self._tcp(text, anywhere=True))
         take_all(every, self._statement, self.moves, self.refusals, options)
         self.moves.hold_mentioned(self._statements(every))
         return self.moves.program(dialect, words=words)
 
     def _statements(self, every: list[Line]) -> Iterator[Span]:
         """The bytes of all lines but those that state poses with a name."""
-        stated = {named.line for named in self.poses.values()}
+        stated = set(self.names.lines)
         for line in every:
             if line.line not in stated:
                 yield line.begin, line.begin + len(line.text)
-
-    def _assignments(self, every: list[Line]) -> None:
-        """Keep poses with a name, and the names that get several values."""
-        for line in every:
-            match, element = _ASSIGNED.fullmatch(line.text), _ELEMENT.match(line.text)
-            if element is not None:
-                self.assigned.setdefault(element[1], line.line)
-                self.poses.pop(element[1], None)
-            if match is None:
-                continue
-            name = match[1]
-            if match[2][:1] == b"[":
-                self.joints.add(name)
-            if name in self.assigned:
-                self.poses.pop(name, None)
-                continue
-            self.assigned[name] = line.line
-            if POSE.fullmatch(match[2]) or JOINTS.fullmatch(match[2]):
-                start = line.begin + match.start(1)
-                value = (line.begin + match.start(2), line.begin + match.end(2))
-                self.poses[name] = _Named(line.line, value, (start, line.begin + len(line.text)))
 
     # -- statements ----------------------------------------------------------------------------------
 
@@ -144,7 +116,8 @@ class _Reader:
                 )
             self._block(line, word)
             return
-        match, element = _ASSIGNED.fullmatch(text), _ELEMENT.match(text)
+        match, element = ASSIGNED.fullmatch(text), ELEMENT.match(text)
+        self.names.assigned(line)
         call = _CALL.fullmatch(text)
         row = TABLE.get(word)
         if word in LEFT:
@@ -158,7 +131,7 @@ class _Reader:
         elif call is not None and word == b"set_tcp":
             self.tools.set(line, self._tcp(call[2]))
         elif match is not None:
-            self._value(line, match[2])
+            self._value(line, match[3])
         elif element is not None:
             self._value(line, text[element.end() :])
         elif row is None or row[0] is not Support.UNCHANGED or self.calls.may_move(text):
@@ -193,6 +166,7 @@ class _Reader:
             self.tools.called(line.text)
             self.moves.known &= not self.calls.own_may_move(line.text)
         self.tools.block(line, word)
+        self.names.block(line, word)
         if word in (b"elif", b"else", b"end"):
             moved = bool(self.blocks) and self.blocks[-1][1] != self.moves.count
             kind = self.blocks[-1][0] if self.blocks else b""
@@ -205,10 +179,11 @@ class _Reader:
             if word in (b"def", b"thread"):
                 self.moves.known = False
 
-    def _tcp(self, text: bytes) -> Pose | None:
-        """The pose that the words of a `set_tcp` state; None where they state none with numbers."""
+    def _tcp(self, text: bytes, *, anywhere: bool = False) -> Pose | None:
+        """The pose that the words of a `set_tcp` state, here or `anywhere`; None where they state none with
+        numbers."""
         first = _ARGUMENT.match(text)
-        return None if first is None else self._pose(first[0])
+        return None if first is None else self._pose(first[0], anywhere=anywhere)
 
     # -- moves ---------------------------------------------------------------------------------------
 
@@ -256,7 +231,7 @@ class _Reader:
         """The joints in degrees near which a pose is reached; none where the robot is. Raises ProgramError
         where an arm needs them, and the text does not state them."""
         match = _NEAR.fullmatch(given[0]) if given else None
-        named = None if match is None else self.poses.get(match[1])
+        named = None if match is None else self.names.get(match[1])
         value = b"" if match is None else match[1]
         stated = JOINTS.fullmatch(value if named is None else self.data[slice(*named.value)])
         if len(given) > 1 or (given and stated is None and self.moves.arm):
@@ -312,7 +287,7 @@ class _Reader:
         self, line: Line, begin: int, text: bytes, statement: Span, rest: dict[str, Span]
     ) -> Use | None:
         """How a move uses joint values, in rad; None where the text does not state them with numbers."""
-        named, blank = self.poses.get(text.strip()), len(text) - len(text.lstrip())
+        named, blank = self.names.get(text), len(text) - len(text.lstrip())
         span = (begin + blank, begin + len(text.rstrip()))
         match = JOINTS.fullmatch(self.data, *(span if named is None else named.value))
         if match is None:
@@ -360,7 +335,7 @@ class _Reader:
             begin, text = begin + stated.start(1) + parts[1].start(), parts[1][0]
         blank = len(text) - len(text.lstrip())
         span = (begin + blank, begin + len(text.rstrip()))
-        named = self.poses.get(text.strip())
+        named = self.names.get(text)
         match = POSE.fullmatch(self.data, *(span if named is None else named.value))
         if match is None:
             raise self._computed(line, text)
@@ -386,9 +361,12 @@ class _Reader:
             code="OLP533",
         )
 
-    def _pose(self, text: bytes) -> Pose | None:
-        """A pose with numbers, or that of a name; None where there is none."""
-        named = self.poses.get(text.strip())
+    def _pose(self, text: bytes, *, anywhere: bool = False) -> Pose | None:
+        """A pose with numbers, or that of a name, here or `anywhere`; None where there is none. One that is a
+        frame or a tool keeps its numbers."""
+        named = self.names.get(text, anywhere=anywhere)
+        if named is not None:
+            self.moves.hold([text.strip().decode("latin-1")])
         value = text.strip() if named is None else self.data[slice(*named.value)]
         match = POSE.fullmatch(value)
         if match is None:
