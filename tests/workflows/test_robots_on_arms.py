@@ -278,7 +278,7 @@ def judged(arm: Arm, language: str, text: bytes, corrected: bytes, steps: list[S
         last = False
         while not last:
             move = found[place]
-            assert move.outer == want.outer
+            arm.carry(move.outer)
             joints = read_joints(move.joints, language)
             if joints is None:
                 turn = move.turn @ TOOL.T
@@ -287,11 +287,16 @@ def judged(arm: Arm, language: str, text: bytes, corrected: bytes, steps: list[S
             here = flange + rotation @ LEVER
             last = np.linalg.norm(here - tip) < 1e-3 + digit
             if last:
+                assert move.outer == want.outer
                 assert np.linalg.norm(turned_by(rotation @ TOOL, aim)) < 2e-6 + turn_digit
-            if kind == "L" and before is not None and came == move.outer:
-                ends = [arm.pose(q) for q in (before, joints)]
+            if kind == "L" and before is not None:
+                ends = []
+                for q, along in ((before, came), (joints, move.outer)):
+                    arm.carry(along)
+                    ends.append(arm.pose(q))
                 tips = [p + r @ LEVER for r, p in ends]
                 for share in (0.25, 0.5, 0.75):
+                    arm.carry(came + share * (move.outer - came))
                     led, at = between(ends[0][0], ends[1][0], share), tips[0] + share * (tips[1] - tips[0])
                     rotation, flange = arm.actual(arm.joints(led, at - led @ LEVER, joints))
                     here, way = flange + rotation @ LEVER, tip - begun[1]

@@ -103,7 +103,8 @@ class _Writer:
         last = np.append(plan.move[1:] != plan.move[:-1], True)[: len(plan.move)]
         tool = self.path.tool[plan.move[rows]]
         poses = self.path.motion.nominal(plan.command[rows], tool)
-        places, turns = self._in_frames(rows, self.held.held(poses, plan.command[rows]))
+        # frames count from where the carriage is at the ends of moves
+        places, turns = self._in_frames(rows, self.held.held(poses, self.path.end[plan.move[rows]]))
         in_joints = np.array([bool(self._target_of(row).joints) for row in rows.tolist()], bool)
         self._keep_branches(rows[~in_joints])
         by_target: dict[int, list[tuple[int, _Wanted]]] = {}
@@ -350,9 +351,18 @@ class _Writer:
         share = float(self.plan.share[row])
         name = self._new_name(target) if self.dialect.names_parts else ""
         # a step that takes up backlash has to be reached
-        part = Part((x, y, z), share, bool(self.stands[row]), name, tuple(turned), wanted.turns)
+        along = self._along(row, target)
+        part = Part((x, y, z), share, bool(self.stands[row]), name, tuple(turned), wanted.turns, along)
         self.tally.inserted_blocks += 1
         return self.dialect.part(self.program, move, use, part)
+
+    def _along(self, row: int, target: Target) -> bytes:
+        """Where the track is at the end of a part; empty where it stands."""
+        if self.held.track is None or target.along == NOWHERE:
+            return b""
+        value = float(self.plan.command[row, self.held.column])
+        text = self._written(target.along, value, self.dialect.decimals)[2]
+        return b"" if text == self.program.data[slice(*target.along)] else text
 
     def _new_name(self, target: Target) -> str:
         """A name that the text does not have, made from that of a target."""

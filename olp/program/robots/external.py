@@ -9,7 +9,7 @@ from olp.core.errors import ProgramError
 from olp.core.machine import Machine
 from olp.program.robots.frames import Located
 from olp.program.robots.poses import Pose
-from olp.program.robots.targets import ABSENT, Target
+from olp.program.robots.targets import ABSENT, NOWHERE, Target
 
 
 class External:
@@ -30,8 +30,9 @@ class External:
         return self._track is not None or any(value is not None for value in self._declared.values())
 
     def moves(self, target: Target, line: int) -> bool:
-        """Whether an axis moves on the way to a target, or may move. One that the target does not state
-        stays. Raises ProgramError where one is at a value at which it is not stated what it carries."""
+        """Whether an axis moves on the way to a target, or may move, so that no part of that can be stated.
+        One that the target does not state stays. Raises ProgramError where one is at a value at which it is
+        not stated what it carries."""
         before = dict(self._at)
         for number, value in enumerate(target.outer, 1):
             if not self._arm or abs(value) >= ABSENT:
@@ -39,6 +40,11 @@ class External:
             stays = self._declared.get(number, 0.0)
             if number == 1 and self._track is not None:
                 self._at[number] = value
+                if self._errors and target.along != NOWHERE:
+                    if before.get(number, value) != value:
+                        what = "along straight moves the track is taken to go evenly with the tip"
+                        self._remark("track", line, what)
+                    before[number] = value
             elif stays is None:
                 self._at[number] = value
                 what = f"the external axis {number} is kept: it moves neither the arm nor the workpiece"

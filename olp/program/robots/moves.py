@@ -117,14 +117,14 @@ class RobotMoves:
         self, line: int, value: Span, numbers: tuple[Span, Span, Span], point: Vector, turn: Quaternion,
         rest: tuple[float, ...], name: str = "", declaration: Span = NOWHERE,
         turned: tuple[Span, ...] = (), turns: tuple[Span, ...] = (), config: tuple[float, ...] = (),
-        outer: tuple[float, ...] = (), copy: Copy = NO_COPY,
+        outer: tuple[float, ...] = (), copy: Copy = NO_COPY, along: Span = NOWHERE,
     ) -> int:  # fmt: skip
         """Add a target that the text states; returns its place."""
         first = self.moves.numbers(numbers)
         slots = (first, first + 1, first + 2)
         self.targets.append(
             Target(line, value, numbers, slots, point, turn, rest, name, declaration, turned, turns,
-                   config, outer, copy=copy)
+                   config, outer, copy=copy, along=along)
         )  # fmt: skip
         return len(self.targets) - 1
 

@@ -37,6 +37,7 @@ class Target:
     external axes. One that is declared has a `name`, and `declaration` are the bytes that declare it.
     `turned` are the bytes of the numbers of its orientation, `turns` those that say how far axes turned.
     `config` are the words that name a posture, NaN where one is not stated, and `outer` the external axes.
+    `along` are the bytes of the first of these, where parts of a move can state others.
     One in joints has their values in degrees (`joints`), the first three of them in `numbers`, the others in
     `turned`. Where the text counts steps of motors, `counts` are those of each joint in a degree. `copy` is
     where another declaration of it goes, in a language that has a place for these. One that is `held` keeps
@@ -59,6 +60,7 @@ class Target:
     counts: tuple[float, ...] = ()
     copy: Copy = NO_COPY
     held: bool = False
+    along: Span = NOWHERE
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +132,8 @@ class Part:
     """A part of a move that ends before it: its three `numbers`, and the `share` of the move where it ends.
 
     `stop`: the robot stops there. `name` is that of its target where the language needs one. `turned` are
-    the numbers of its orientation where it is corrected, `turns` what replaces those of `Target.turns`."""
+    the numbers of its orientation where it is corrected, `turns` what replaces those of `Target.turns`, and
+    `along` where the track is that carries the arm, where it goes along the move."""
 
     numbers: tuple[bytes, bytes, bytes]
     share: float
@@ -138,11 +141,13 @@ class Part:
     name: str
     turned: tuple[bytes, ...] = ()
     turns: tuple[bytes, ...] = ()
+    along: bytes = b""
 
     def renumbered(self, target: Target) -> list[tuple[int, int, bytes]]:
         """What replaces the numbers of a target, from its first byte on."""
         start, spans = target.value[0], list(target.numbers)
         spans += target.turned if self.turned else ()
         spans += target.turns if self.turns else ()
-        texts = (*self.numbers, *self.turned, *self.turns)
+        spans += [target.along] if self.along else []
+        texts = (*self.numbers, *self.turned, *self.turns, *([self.along] if self.along else []))
         return [(a - start, b - start, text) for (a, b), text in zip(spans, texts, strict=True)]

@@ -399,7 +399,7 @@ class _Reader:
                 NOWHERE if name is None else (declaration.begin, declaration.end), (a, b, c),
                 (values["T"][0],) if "T" in values else (),
                 tuple(values[word][1] if word in values else NAN for word in "ST"),
-                _outer(numbers, ABSENT),
+                _outer(numbers, ABSENT), along=values[_OUTER[0]][0] if _OUTER[0] in values else NOWHERE,
             )  # fmt: skip
         return self.targets[numbers.span], NOWHERE if name is None else span
 

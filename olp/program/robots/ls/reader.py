@@ -17,7 +17,7 @@ from olp.program.robots.ls.registers import Registers
 from olp.program.robots.ls.text import Line, Position, lines, parts, positions
 from olp.program.robots.moves import RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose, of_zyx, rotated
-from olp.program.robots.targets import Span, Use
+from olp.program.robots.targets import NOWHERE, Span, Use
 
 #: The same of an arc, whose via point stands first.
 _ARC = pattern(rb"(?i)(\s*)C\s+P\[\s*(\d+)\s*(?::[^\]]*)?\]\s+(PR?\[.*)")
@@ -312,6 +312,7 @@ class _Reader:
                 position.line, position.span, (x, y, z), (a, b, c), _turn(position),
                 (config, *outer), f"P[{number}]", position.span,
                 (axes["R"][0], axes["P"][0], axes["W"][0]), turns, words, outer,
+                along=axes["E1"][0] if "E1" in axes else NOWHERE,
             )  # fmt: skip
         return known
 

@@ -217,7 +217,7 @@ class Declared:
             known = self._targets[key] = self.moves.target(
                 data.statement.line, key, stated.spans, stated.point, stated.turn, stated.rest, name,
                 (data.statement.begin, data.statement.end), stated.turned, stated.turns, stated.config,
-                stated.outer,
+                stated.outer, along=stated.along,
             )  # fmt: skip
         return known
 

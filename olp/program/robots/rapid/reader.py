@@ -328,7 +328,7 @@ class _Reader:
             stated, value = target_of(match, line), match.span()
             place = self.moves.target(
                 line, value, stated.spans, stated.point, stated.turn, stated.rest, turned=stated.turned,
-                turns=stated.turns, config=stated.config, outer=stated.outer,
+                turns=stated.turns, config=stated.config, outer=stated.outer, along=stated.along,
             )  # fmt: skip
             return place, NOWHERE
         name = name_of(self.data[slice(*span)])

@@ -53,8 +53,8 @@ def quaternion(numbers: Sequence[float], line: int) -> Quaternion:
 @dataclass(frozen=True, slots=True)
 class Stated:
     """What a robtarget states: the bytes of its position, this, its orientation, and the `rest`:
-    configuration and external axes. `turned` and `turns` are the bytes of the orientation, and of the
-    quarters of axes."""
+    configuration and external axes. `turned`, `turns` and `along` are the bytes of the orientation, of the
+    quarters of axes, and of the first external axis."""
 
     spans: tuple[Span, Span, Span]
     point: Vector
@@ -62,6 +62,7 @@ class Stated:
     rest: tuple[float, ...]
     turned: tuple[Span, ...]
     turns: tuple[Span, ...]
+    along: Span
 
     @property
     def config(self) -> tuple[float, ...]:
@@ -77,7 +78,8 @@ def target_of(match: re.Match[bytes], line: int) -> Stated:
     x, y, z, *others = map(float, match.groups())
     regs = match.regs
     spans = (regs[1], regs[2], regs[3])
-    return Stated(spans, (x, y, z), quaternion(others[:4], line), tuple(others[4:]), regs[4:8], regs[8:11])
+    turn = quaternion(others[:4], line)
+    return Stated(spans, (x, y, z), turn, tuple(others[4:]), regs[4:8], regs[8:11], regs[12])
 
 
 @dataclass(frozen=True, slots=True)
