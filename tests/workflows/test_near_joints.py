@@ -59,3 +59,27 @@ def test_joints_that_are_not_stated_name_no_posture(tmp_path: Path) -> None:
     text = TEXT.format(numbers(pose(Q)), numbers(np.radians(Q)), "get_target_joint_positions()")
     with pytest.raises(ProgramError, match="is computed"):
         olp.correct_joints(text.encode(), arm_files(tmp_path))
+
+
+@pytest.mark.slow
+def test_a_pose_from_where_the_run_has_the_arm_is_left(tmp_path: Path) -> None:
+    """Its posture is that of the arm before it. So is the one behind it; a pose that corrected moves share
+    with it stays, and they go to a clone. Where no posture is known at all, all is refused."""
+    near, far = (f"[{numbers(np.radians(q))}]" for q in (Q, Q + 5.0))
+    begin = f"  P=p[{numbers(pose(Q + 2.0))}]\n  movej({near})\n  movel(P)\n"
+    branch = f"  if get_digital_in(1):\n    movej({far})\n  end\n"
+    left = f"  movel(P)\n  movel(p[{numbers(pose(Q + 3.0))}])\n"
+    text = f"def made():\n  set_tcp(p[0,0,0,0,0,0])\n{begin}{branch}{left}  movej({far})\n  movel(P)\nend\n"
+    machine = arm_files(tmp_path)
+    result = olp.correct_joints(text.encode(), machine)
+    assert result.report["verdict"]["ok"]
+    assert result.report["moves"]["uncorrected"] == 2
+    assert any("left as written: where this move begins" in str(one) for one in result.report["findings"])
+    done = result.data.decode()
+    assert begin.split("\n")[0] in done
+    assert left in done
+    assert done.count("movel(P_olp") == 2
+    assert olp.verify_joints(text.encode(), result.data, machine).report["verdict"]["ok"]
+    alone = f"def made():\n  set_tcp(p[0,0,0,0,0,0])\n{begin[: begin.index('movej')]}movel(P)\n{left}end\n"
+    with pytest.raises(ProgramError, match="does not state its configuration"):
+        olp.correct_joints(alone.encode(), machine)

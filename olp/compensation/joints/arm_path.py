@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import field, replace
 
 import numpy as np
@@ -131,9 +132,14 @@ def arm_path(
         flange, joints, values, fits, straight, used.mask("free"),
         np.isnan(config).any(axis=1) | (config.shape[1] == 0), begins, np.where(begins, before, 0), used.line,
     )  # fmt: skip
-    width = len(structure.order)
+    wordless = np.array([not words for words in used.of("config")], bool)
+    width, settled = len(structure.order), Settled(arm, wanted, postures, travel)
     end = np.full((count, width), np.nan)
-    end[rows] = held.joined(Settled(arm, wanted, postures, travel).axes(held.own(start_deg)), along)
+    end[rows] = held.joined(settled.axes(held.own(start_deg), wordless), along)
+    if settled.left:
+        left = np.array(list(settled.left))
+        straight[left], known[rows[left]], end[rows[left]] = False, False, np.nan
+        program = _leaving(program, rows[left], settled.left.values())
     feed, unsplit, none = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count, bool)
     feed[rows], unsplit[rows] = straight, used.mask("whole")
     start = np.vstack((np.full((1, width), np.nan), end[:-1]))[:count]
@@ -147,6 +153,20 @@ def arm_path(
         Directions.none(count), Curves.none(count), from_level=from_level,
         half_deg=_filled(rows, held.joined(used.half_deg(arm), 0.0), count),
     )  # fmt: skip
+
+
+def _leaving(program: Program, moves: Index, why: Iterable[ProgramError]) -> Program:
+    """A program that leaves moves as they are written: their targets keep their numbers. Raises `why` where
+    one is on an arc, which is led from there."""
+    targets = program.targets
+    assert targets is not None
+    if any(((arc.first <= moves) & (moves <= arc.last)).any() for arc in targets.arcs):
+        raise ProgramError.together(iter(why))
+    held = {use.target for move in moves.tolist() if (use := targets.uses[move]) is not None}
+    own = [replace(one, held=one.held or k in held) for k, one in enumerate(targets.targets)]
+    what = "left as written: where this move begins depends on the run, and so does the posture of the arm"
+    remark = "told", int(program.toolpath.line[moves[0]]), what
+    return replace(program, targets=replace(targets, targets=tuple(own)), remarks=(*program.remarks, remark))
 
 
 def _refuse_turns(arm: Arm, start: Array, end: Array, straight: Mask, line: Index) -> None:

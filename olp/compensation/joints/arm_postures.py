@@ -44,7 +44,8 @@ class Wanted:
 
 
 class Settled:
-    """The postures of all targets, one after the other."""
+    """The postures of all targets, one after the other. Those in `left` by their numbers have none, for the
+    reasons: the run decides where a move begins, and its language has no word that names a posture."""
 
     def __init__(self, arm: Arm, wanted: Wanted, postures: Array, travel: Array) -> None:
         self.arm, self.wanted, self.travel = arm, wanted, travel
@@ -53,12 +54,18 @@ class Settled:
         self.fits = wanted.fits & ~beyond.any(axis=2)
         self.reached = np.asarray(np.isfinite(postures[:, :, 1]).any(axis=1), bool)
         self.next, self.furthest = self._steps()
+        self.left: dict[int, ProgramError] = {}
 
-    def axes(self, start_deg: Array) -> Array:
+    def axes(self, start_deg: Array, wordless: Mask | None = None) -> Array:
         """(n, 6) axis values of all targets. `start_deg` (6,) is where the arm is at first, NaN where that
-        is not known. Raises ProgramError with all targets that no posture reaches, or that name several."""
+        is not known; NaN of those that are `left`, which are `wordless` (n,). Raises ProgramError with all
+        targets that no posture reaches, or that name several, and where all are left."""
         wanted = self.wanted
         values, last, which, lost = np.empty(wanted.joints.shape), start_deg, -1, False
+        undecided: Mask = np.zeros(len(values), bool) if wordless is None else wordless & wanted.begins
+        undecided &= (wanted.behind == wanted.line) & self.reached
+        # before the first move start_deg may say where the arm is
+        undecided[:1] = False
         refusals: list[ProgramError] = []
         in_joints = np.isfinite(wanted.joints[:, 0]).tolist()
         begins, line = wanted.begins.tolist(), wanted.line.tolist()
@@ -77,11 +84,15 @@ class Settled:
                 last = values[k] = found
                 lost = False
             except ProgramError as error:
+                if undecided[k] or (lost and k - 1 in self.left and self._follows(k) and self.reached[k]):
+                    self.left[k] = error
+                    values[k] = np.nan
                 # where the posture before is not known, this one is not, too
-                if not (lost and self._follows(k)):
+                elif not (lost and self._follows(k)):
                     refusals.append(error)
                 last, which, lost = np.full(AXES, np.nan), -1, True
             k += 1
+        refusals += self.left.values() if len(self.left) == len(values) else []
         if refusals:
             raise ProgramError.together(iter(refusals))
         return values
