@@ -160,15 +160,17 @@ def _switched(text: bytes, setup: Setup, dialect: Dialect) -> bytes:
 
 
 def beside(sources: Sources, program: Source) -> Callable[[str], tuple[str, bytes] | None]:
-    """Gives name and text of the file of a subprogram in the folder of the program, None without one."""
+    """Gives name and text of the file of a subprogram in the folder of the program, None without one. Its
+    name ends as those of subprograms do, or as that of the program."""
 
     def in_folder(wanted: str) -> tuple[str, bytes] | None:
         if not program.name:
             return None
         number = (wanted, *(f"{o}{wanted.zfill(n)}" for o in "Oo" for n in _DIGITS))
         names = number if wanted.isdigit() else (wanted, f"O{wanted}".upper())
-        for name, ending in product(names, _ENDINGS):
-            candidate = Path(program.name).parent / f"{name}{ending}"
+        main = Path(program.name)
+        for name, ending in product(names, (*_ENDINGS, main.suffix)):
+            candidate = main.parent / f"{name}{ending}"
             if sources.exists(candidate):
                 return str(candidate), sources.read(candidate)
         return None

@@ -350,6 +350,7 @@ def refused(folder: Path, text: str, sub: str = "", job: str = "") -> OlpError:
     return caught.value
 
 
+POINT = 'decimal_point = "calculator"\n[axes.X]'
 LOOP = "o1 while [#1 lt 3]\n#1 = [#1 + 1]\n{}o1 endwhile\nM2\n"
 CALL = "o<sub> call\nM2\n"
 
@@ -371,6 +372,16 @@ def test_errors_name_the_line_and_the_file_of_the_original(
     error = refused(folder, CALL, block.replace("#1", "3"))
     assert isinstance(error, kind)
     assert (error.file, error.line) == (str(folder / "sub.ngc"), SILENT + 2)
+
+
+def test_a_subprogram_may_be_in_a_file_that_ends_as_the_program_does(folder: Path) -> None:
+    (folder / "o1001.cnc").write_text("O1001\nG21 G90 G54\nG0 X10. Y10. Z5.\nM98 P1002\nM30\n")
+    (folder / "o1002.cnc").write_text("O1002\nG1 X20. F100.\nM99\n")
+    (folder / "fanuc.toml").write_text(
+        (folder / "machine.toml").read_text().replace('"linuxcnc"', '"fanuc"').replace("[axes.X]", POINT, 1)
+    )
+    text = olp.flatten(folder / "o1001.cnc", folder / "fanuc.toml")
+    assert b"G1 X20. F100." in text
 
 
 @pytest.mark.slow

@@ -269,6 +269,20 @@ def test_the_tool_is_at_its_radius_beside_the_contour(
     )
 
 
+@pytest.mark.parametrize(
+    ("delta", "same"),
+    [("1.", "+1"), (".5", "+.5"), ("2.", "+2"), ("25", "+25"), ("2:+1", "+0"), ("2+1", "+0")],
+)
+def test_the_delta_of_the_radius_may_have_no_sign(bent: Path, delta: str, same: str) -> None:
+    """DR2 is the delta of another radius."""
+    texts = [
+        f"TOOL CALL 1 Z DR{d}\nL X-90 Y-90 Z+5 R0 FMAX\nL X+0 Y+0 RL F300\nL Y+400\nL X-90 R0\n"
+        for d in (delta, same)
+    ]
+    one, other = (olp.flatten(text.encode(), bent).split(b"\n", 1)[1] for text in texts)
+    assert one == other
+
+
 def test_an_approach_and_a_departure_are_beside_the_contour_too(bent: Path) -> None:
     text = "TOOL CALL 1 Z\nL X-20 Y-20 Z+5 R0 FMAX\nAPPR LT X+0 Y+0 LEN15 RR F100\nL X+40\nDEP LT LEN10\n"
     plain = olp.flatten((text + "L Y+50\n").encode(), bent).decode().split("\n")

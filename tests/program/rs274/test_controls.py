@@ -159,8 +159,8 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
     ),
     "radius_holds": (
         "G0 X0. Y0. Z1.\nD1\nG41 G1 X5. Y0. F60.\nY9.\nG40 X0.",
-        dict.fromkeys((FANUC, MAZAK), "the radius of tool 1, which is not known")
-        | dict.fromkeys((HAAS, SIEMENS), "G41 has no D word, and which radius it takes"),
+        dict.fromkeys((FANUC, HAAS, MAZAK), "the radius of tool 1, which is not known")
+        | {SIEMENS: "G41 has no D word, and which radius it takes"},
         "not",
     ),
     "spindle_words": (

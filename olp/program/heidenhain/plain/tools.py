@@ -10,8 +10,10 @@ from olp.core.units import MM_PER_INCH
 from olp.program.heidenhain.modes import TOOL_CALL
 from olp.program.heidenhain.statements import Statement
 
-#: the delta of the radius, behind a sign, `=` or `:`
-_DELTA = re.compile(rb"\bDR[ \t]*[=:]?[ \t]*([-+][ \t]*(?:\d+\.?\d*|\.\d+))", re.I)
+#: the delta of the radius, behind `=` or `:` or at once; a bare 2 belongs to the name of another delta, DR2
+_DELTA = re.compile(
+    rb"\bDR[ \t]*[=:]?[ \t]*([-+][ \t]*(?:\d+\.?\d*|\.\d+)|(?!2(?![\d.]))(?:\d+\.?\d*|\.\d+))", re.I
+)
 _ANY_DELTA = re.compile(rb"\bDR(?!2)", re.I)
 
 
@@ -36,7 +38,7 @@ class Radius:
         delta = _DELTA.search(match["rest"])
         if delta is None and _ANY_DELTA.search(match["rest"]):
             raise ProgramError(
-                "TOOL CALL has DR without a number; state it with its sign",
+                "TOOL CALL has DR without a number; state it",
                 line=statement.line,
                 code="OLP516",
             )

@@ -19,6 +19,7 @@ class Language:
     - `macro_b`: IF, WHILE, DO, END and GOTO control the run without O-words, and the right side of an
       assignment needs no brackets. Variables are numbered as in Macro B: #1 to #33 local, vacant until set.
     - `user_tasks`: variables have names, words take their value behind `=`, and CALL runs a subprogram.
+    - `common_again`: common variables with a second number, 10,000 more; #10000 to #10999 are common then.
     - `modal_variables`: #4001 to #4010 and #4107 to #4120 have what is in force before a block.
     - `work_offsets`: #5221 and on have the work offsets G54 and on, which a program in Macro B may set.
       `hole_patterns`: G70 and G71 make holes around a centre.
@@ -37,6 +38,7 @@ class Language:
     arithmetic: Arithmetic
     macro_b: bool
     user_tasks: bool = False
+    common_again: tuple[range, ...] = ()
     modal_variables: bool
     work_offsets: bool = False
     hole_patterns: bool = False

@@ -27,8 +27,10 @@ _MACRO_B_LOCAL = 33
 _NUMBERED = pattern(rb"#[ \t]*(\d+)")
 #: the present position of Z
 _PRESENT_Z = 5043
-#: common variables are below this
+#: common variables are from 100 to below this
 _MACRO_B_COMMON = 1000
+#: what the second number of a common variable has more
+_AGAIN = 10_000
 _FEED_MODES = {"_inverse_time": INVERSE_TIME, "_units_per_minute": 940, "_units_per_rev": 950}
 _ARGUMENT_NUMBERS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 13, *range(17, 27))
 _ARGUMENTS = dict(zip("abcijkdefhmqrstuvwxyz", _ARGUMENT_NUMBERS, strict=True))
@@ -65,7 +67,7 @@ class Variables:
         self.modal = ModalVariables()
         self.tasks = state.profile.language.user_tasks
         names = {_bare(name, tasks=self.tasks): value for name, value in (given or {}).items()}
-        self.given = {int(name): value for name, value in names.items() if name.isdigit()}
+        self.given = {self._one(int(name)): value for name, value in names.items() if name.isdigit()}
         self.given_names = {name: value for name, value in names.items() if not name.isdigit()}
         self.common: dict[int, float | None] = {}
         self.globals: dict[str, float] = {"_value": 0.0, "_value_returned": 0.0}
@@ -78,8 +80,17 @@ class Variables:
         """Whether all variables of a line are the control's own, so that plain blocks have them too."""
         numbers = [int(n) for n in _NUMBERED.findall(raw)]
         return len(numbers) == raw.count(b"#") and not any(
-            n <= _MACRO_B_LOCAL or n in self.common for n in numbers
+            n <= _MACRO_B_LOCAL or self._one(n) in self.common for n in numbers
         )
+
+    def _one(self, index: int) -> int:
+        """The number under which a variable is kept: common variables may have two."""
+        plain = index - _AGAIN
+        return plain if any(plain in span for span in self.state.profile.language.common_again) else index
+
+    def _is_common(self, index: int) -> bool:
+        further = bool(self.state.profile.language.common_again)
+        return 100 <= index < _MACRO_B_COMMON or (further and _AGAIN <= index < _AGAIN + _MACRO_B_COMMON)
 
     def number(self, index: int) -> float | None:
         if self.state.profile.language.macro_b:
@@ -113,8 +124,8 @@ class Variables:
                     code="OLP541",
                 )
             return value
-        if index in self.common:
-            return self.common[index]
+        if self._one(index) in self.common:
+            return self.common[self._one(index)]
         if index == _PRESENT_Z and self.modal.length_on:
             raise ProgramError(
                 f"whether #{index} counts the tool length is a setting of the control; use #5003, the end of "
@@ -143,7 +154,8 @@ class Variables:
 
     def _of_control(self, index: int) -> float | None:
         """What the job states of a variable that the control has, or of a work offset."""
-        return self.given[index] if index in self.given else self.offsets.value(index)
+        one = self._one(index)
+        return self.given[one] if one in self.given else self.offsets.value(index)
 
     def named(self, name: str) -> float:
         known = self._predefined(name)
@@ -230,8 +242,8 @@ class Variables:
     def _assign_macro_b(self, index: int, value: float | None) -> None:
         if 1 <= index <= _MACRO_B_LOCAL:
             self.locals[index] = value
-        elif 100 <= index < _MACRO_B_COMMON:
-            self.common[index] = value
+        elif self._is_common(index):
+            self.common[self._one(index)] = value
         elif index == 3000:
             raise ProgramError("the program stops here with its own alarm (#3000)", code="OLP544")
         elif index not in (3003, 3004):

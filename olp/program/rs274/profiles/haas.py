@@ -19,6 +19,8 @@ _INSIDE = {
 #: G101 and G100 switch mirror images on and off.
 _MIRROR = {MIRROR: Act.EVENT, 501: Act.EVENT}
 _CYCLES = {770: Act.MOTION, **dict.fromkeys((700, 710, 720, 870, *_INSIDE), Act.REFUSE)}
+#: The next generation control numbers common variables from 10000, and knows these older numbers of them.
+_COMMON_AGAIN = (range(100, 200), range(500, 700), range(800, 1000))
 _AROUND = "makes holes around the present position inside the control"
 _ALONG = "G72 makes holes along a line inside the control; post each hole with its place"
 
@@ -31,6 +33,8 @@ DIALECT = replace(
     ),
     aliases={1010: MIRROR, 1000: 501, MIRROR: NO_CODE},
     mirrors_at_zero=True,
+    # D00 cancels the D before it, says the list of address codes in the manual
+    radius_holds=True,
     refusals={
         **ISO.refusals,
         921: "G92.1 is not a code of this control",
@@ -49,6 +53,6 @@ DIALECT = replace(
     first_further=110,
     tip_codes=frozenset({2340}),
     cycles=HAAS_CYCLES,
-    language=replace(MACRO_B, hole_patterns=True),
+    language=replace(MACRO_B, hole_patterns=True, common_again=_COMMON_AGAIN),
     path_mode="the control's own smoothing (G187)",
 )

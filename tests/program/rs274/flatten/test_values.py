@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from cases.unrolling import fanuc, lcnc, refused
+from cases.unrolling import fanuc, flatten, lcnc, refused
 
 _BY_CONTROL = "and no plain block has the effect of setting it"
 _WAY_ON = 'give it in the job file: [parameters] "{}" = ...'
@@ -126,6 +126,27 @@ def test_variables_of_macro_b_are_local_up_to_33() -> None:
 )  # fmt: skip
 def test_variables_of_macro_b_that_are_not_known(block: str, code: str, message: str) -> None:
     assert refused(f"O1\n{block}\n", "fanuc") == (code, message, 2)
+
+
+@pytest.mark.parametrize(("one", "other"), [(100, 10100), (199, 10199), (650, 10650), (999, 10999)])
+def test_common_variables_of_haas_have_a_second_number(one: int, other: int) -> None:
+    for first, second in ((one, other), (other, one), (other, other)):
+        text = flatten(f"O1\n#{first}=7.\nX#{second}\nM30\n".encode(), profile="haas")
+        assert text == b"O1\nX7.\nM30\n"
+        text = flatten(f"O1\nX#{second}\nM30\n".encode(), profile="haas", parameters={f"#{first}": 8.0})
+        assert text == b"O1\nX8.\nM30\n"
+    assert refused(f"O1\n#{other}=7.\n", "fanuc")[:2] == (
+        "OLP544", f"#{other} belongs to the control, {_BY_CONTROL}",
+    )  # fmt: skip
+
+
+def test_further_common_variables_of_haas() -> None:
+    for index in (10000, 10299, 10750):
+        text = f"O1\n#{index}=7.\nX#{index}\nM30\n"
+        assert flatten(text.encode(), profile="haas") == b"O1\nX7.\nM30\n"
+    # that of three digits is another, which the control uses itself
+    assert refused("O1\n#10750=7.\nX#750\n", "haas")[0] == "OLP541"
+    assert refused("O1\n#11000=7.\n", "haas")[0] == "OLP544"
 
 
 def test_variables_of_macro_b_that_change_no_path() -> None:
