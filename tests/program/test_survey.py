@@ -40,6 +40,23 @@ def test_a_program_that_is_read_is_read() -> None:
     assert survey.read_all(HEAD, SETUP, named("linuxcnc")).toolpath.line.tolist() == [2]
 
 
+@pytest.mark.parametrize(("line", "controls"), [
+    (b"#500=#500+1", ("fanuc", "haas", "mazak")), (b"N7 #199 = FIX[#501] MOD 2 (A) ; a", ("fanuc", "haas")),
+    (b"#10002= #3020 - #10000", ("haas",)),
+])  # fmt: skip
+def test_a_counter_moves_nothing(line: bytes, controls: tuple[str, ...]) -> None:
+    text = HEAD + line + b"\nG1 X1. F60.\n"
+    for control in controls:
+        read(text, SETUP, named(control))
+    for control in {"linuxcnc", "grbl", "mach3", "fanuc"} - set(controls):
+        assert stated(text, control) == [(3, "OLP511", None)]
+    # other variables are those of a macro, or move what the control measures from
+    for other in (b"#1", b"#33", b"#2001", b"#5221", b"#3000"):
+        assert stated(HEAD + other + b"=#500\n", "fanuc") == [(3, "OLP511", None)]
+    # its words are none of the block
+    assert stated(HEAD + b"#500=#501MOD2\nG41 G1 X5. F60.\n", "fanuc")[0][1] == "OLP513"
+
+
 @pytest.mark.parametrize("line", [b"POPEN", b"/N5 DPRNT[X*(A)*#5041[33]] ;a", b"pclos", b"BPRNT [ #1[3] ]"])
 def test_what_a_macro_prints_moves_nothing(line: bytes) -> None:
     text = HEAD + line + b"\nX5.\n"

@@ -32,6 +32,15 @@ PRINTS = (
 _NEWLINE = pattern(rb"\n")
 
 
+def counting(numbers: bytes) -> bytes:
+    """Statements of Macro B that only give one of these common variables a value, as counters of parts do."""
+    return (
+        rb"[ \t]*(?:[Nn][ \t]*\d+[ \t]*)?#[ \t]*" + numbers + rb"[ \t]*="
+        rb"(?i:[-+*/\[\]#\d. \t]|MOD|AND|XOR|OR|ABS|A?SIN|A?COS|A?TAN|SQRT|FIX|FUP|ROUND|EXP|LN|BIN|BCD)+"
+        rb"(?:\([^)\r\n]*\)[ \t]*)?(?:;[^\r\n]*)?"
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockText:
     """What may be in a line of a control.

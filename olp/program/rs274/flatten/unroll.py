@@ -209,12 +209,11 @@ class _Flattener:
         self._units[frame.unit.key] = frame.unit
         seen = self._present in self._seen
         self._seen.add(self._present)
-        if line.prints:
-            self._put(line.raw if self.variables.of_control(line.raw) else _left_out(line.raw), line.eol)
-            return False
-        if line.opaque:
-            self._put(line.raw, line.eol)
-            self.state.forget()
+        if line.prints or line.opaque or self.variables.counts(line):
+            left = line.prints and not self.variables.of_control(line.raw)
+            self._put(_left_out(line.raw) if left else line.raw, line.eol)
+            if line.opaque:
+                self.state.forget()
             return False
         values = [(word.letter, self._value(word)) for word in line.words]
         settings = [(a.target(self.variables), a.value(self.variables)) for a in line.assignments]

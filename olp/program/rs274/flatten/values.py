@@ -29,6 +29,8 @@ _NUMBERED = pattern(rb"#[ \t]*(\d+)")
 _PRESENT_Z = 5043
 #: common variables are from 100 to below this
 _MACRO_B_COMMON = 1000
+#: a value that only the control has
+_NOT_KNOWN = "OLP541"
 #: what the second number of a common variable has more
 _AGAIN = 10_000
 _FEED_MODES = {"_inverse_time": INVERSE_TIME, "_units_per_minute": 940, "_units_per_rev": 950}
@@ -70,6 +72,8 @@ class Variables:
         self.given = {self._one(int(name)): value for name, value in names.items() if name.isdigit()}
         self.given_names = {name: value for name, value in names.items() if not name.isdigit()}
         self.common: dict[int, float | None] = {}
+        #: common variables that the control counts, with why they are not known
+        self.counted: dict[int, ProgramError] = {}
         self.globals: dict[str, float] = {"_value": 0.0, "_value_returned": 0.0}
         most = _MACRO_B_LOCAL if state.profile.language.macro_b else _NGC_LOCAL
         #: those of the program itself
@@ -82,6 +86,23 @@ class Variables:
         return len(numbers) == raw.count(b"#") and not any(
             n <= _MACRO_B_LOCAL or self._one(n) in self.common for n in numbers
         )
+
+    def counts(self, line: Line) -> bool:
+        """Whether a line only gives a common variable a value that the control alone knows, as a counter of
+        parts does. Plain blocks have such a line as it is, and the variable is not known behind it."""
+        inert = self.state.profile.inert
+        if not (line.assignments and inert and inert.fullmatch(line.raw) and self.of_control(line.raw)):
+            return False
+        try:
+            for assignment in line.assignments:
+                assignment.value(self)
+        except ProgramError as error:
+            if error.code != _NOT_KNOWN:
+                raise
+            for assignment in line.assignments:
+                self.counted[self._one(int(assignment.target(self)))] = error
+            return True
+        return False
 
     def _one(self, index: int) -> int:
         """The number under which a variable is kept: common variables may have two."""
@@ -126,6 +147,8 @@ class Variables:
             return value
         if self._one(index) in self.common:
             return self.common[self._one(index)]
+        if self._one(index) in self.counted:
+            raise self.counted[self._one(index)]
         if index == _PRESENT_Z and self.modal.length_on:
             raise ProgramError(
                 f"whether #{index} counts the tool length is a setting of the control; use #5003, the end of "

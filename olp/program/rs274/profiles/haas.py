@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from olp.core.patterns import pattern
+from olp.program.rs274.block_text import counting
 from olp.program.rs274.codes import HOLE_PATTERNS, MIRROR
 from olp.program.rs274.cycle_rules import HAAS_CYCLES
 from olp.program.rs274.flatten.language import MACRO_B
 from olp.program.rs274.profiles.base import NO_CODE, Act, g_codes
-from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
+from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED, STILL_LINES
 
 _OFFSETS = dict.fromkeys((1540, *range(1100, 1300, 10)), Act.EVENT)
 #: G77 bores from below, and with G87 an operator leaves the bore; G70 to G72 make patterns of holes. Where
@@ -53,6 +55,7 @@ DIALECT = replace(
     first_further=110,
     tip_codes=frozenset({2340}),
     cycles=HAAS_CYCLES,
+    inert=pattern(STILL_LINES + counting(rb"(?:10\d|[1-9])\d\d")),
     language=replace(MACRO_B, hole_patterns=True, common_again=_COMMON_AGAIN),
     path_mode="the control's own smoothing (G187)",
 )

@@ -7,7 +7,7 @@ from dataclasses import replace
 from olp.core.patterns import pattern
 from olp.program.contours.rules import ISO_CONTOURS
 from olp.program.rs274.block_rules import ISO_RULES
-from olp.program.rs274.block_text import PRINTS, BlockText
+from olp.program.rs274.block_text import PRINTS, BlockText, counting
 from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import MACRO_B
@@ -21,6 +21,8 @@ ISO_EXTRA = {
     **dict.fromkeys((440, 541, 500, 510, 680, 690), Act.EVENT),
     **dict.fromkeys((411, 421, 921), Act.REFUSE),
 }
+#: `:1234` is another way to write the number of a program.
+STILL_LINES = rb"[ \t]*:[ \t]*\d+[ \t]*(?:\([^)]*\)[ \t]*)?|" + PRINTS + b"|"
 
 #: What they have in common; each control states its name, its codes, and where it differs.
 ISO = Profile(
@@ -51,8 +53,7 @@ ISO = Profile(
     numbers_hold=True,
     zero_ends_length=True,
     text=BlockText(inner_brackets=True),
-    # `:1234` is another way to write the number of a program
-    inert=pattern(rb"[ \t]*:[ \t]*\d+[ \t]*(?:\([^)]*\)[ \t]*)?|" + PRINTS),
+    inert=pattern(STILL_LINES + counting(rb"[1-9]\d\d")),
     cycles=ISO_CYCLES,
     contours=ISO_CONTOURS,
     language=replace(MACRO_B, calls_at_q=True),

@@ -97,7 +97,8 @@ def _lines(profile: Control) -> Iterator[Row]:
     yield Row("/ (block delete)", Support.READ, "counts as carried out; proved with it and without")
     yield Row("% and O with a number", Support.UNCHANGED)
     if profile.inert is not None:
-        yield Row("names of programs, labels, prints and questions alone in a line", Support.UNCHANGED)
+        what = "names of programs, labels, prints, counters and questions alone in a line"
+        yield Row(what, Support.UNCHANGED)
     for name, (_, why) in profile.text.outside.items():
         yield Row(name, Support.REFUSED, why)
     tasks = profile.language.user_tasks

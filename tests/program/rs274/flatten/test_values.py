@@ -149,6 +149,44 @@ def test_further_common_variables_of_haas() -> None:
     assert refused("O1\n#11000=7.\n", "haas")[0] == "OLP544"
 
 
+COUNTERS = [
+    "#500=#500+1", "N7 # 501 = [#500 + #3001] / 2. (TIME) ; a", "#502=FIX[#501]MOD 3", "#503=#501 OR 4",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("block", COUNTERS)
+def test_a_block_that_counts_for_the_control_alone_is_kept(block: str) -> None:
+    source = f"O1\n#1=2.\nX#1\n{block}\nX5.\nM30\n"
+    assert fanuc(source) == f"O1\nX2.\n{block}\nX5.\nM30\n"
+    counted = block.split("=")[0].split("#")[1].strip()
+    code, message, line = refused(source.replace("X5.", f"X#{counted}"), "fanuc")
+    assert (code, line) == ("OLP541", 5)
+    assert "is not set before in the program" in message
+    # the program gives it a value again
+    again = source.replace("X5.", f"#{counted}=5.\nX#{counted}")
+    assert fanuc(again) == f"O1\nX2.\n{block}\nX5.\nM30\n"
+
+
+def test_a_counter_that_the_program_or_the_job_knows_is_counted() -> None:
+    assert fanuc("O1\n#500=3\n#500=#500+1\nX#500\nM30\n") == "O1\nX4.\nM30\n"
+    count = "O1\n#500=#500+1\nX#500\nM30\n"
+    assert fanuc(count, parameters={"#500": 6}) == "O1\nX7.\nM30\n"
+    # what is counted from what is not known is not what the job says of it
+    assert refused("O1\n#500=#500+#501\nX#500\nM30\n", "fanuc", parameters={"#500": 6}) == (
+        "OLP541", f"#501 {_NOT_SET} {_WAY_ON.format('#501')}", 3,
+    )  # fmt: skip
+    assert flatten(b"O1\n#10002= #3020 - #10000\nM30\n", profile="haas") == (
+        b"O1\n#10002= #3020 - #10000\nM30\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "block", ["#1=#500", "#500=#1+#501", "#5221=#500", "#3000=#500", "#500=#501 X5.", "/#500=#500+1"]
+)
+def test_other_blocks_with_values_of_the_control_are_refused(block: str) -> None:
+    assert refused(f"O1\n#1=2.\n{block}\nX5.\nM30\n", "fanuc")[2] == 3
+
+
 def test_variables_of_macro_b_that_change_no_path() -> None:
     assert fanuc("O1\n#3003=1\n#3004=7\nX1.\nM30\n") == "O1\nX1.\nM30\n"
 
