@@ -154,7 +154,8 @@ class Machine:
     `default_motion` is the motion code in force at the start of a program, where its control does not fix it.
     `still_macros` are the macros of a printer that move no axis and change no mode. `bracket_comments`:
     to its firmware (a) is a comment.
-    `still_m_codes` are M codes of the machine's builder that move no axis.
+    `still_m_codes` are M codes of the machine's builder that move no axis, `still_g_codes` such G codes that
+    its dialect does not know, ten times their numbers.
     `real_time` is the beginning of the hash of the calibration that the control itself corrects by in every
     servo cycle, None where it does not.
     `styli` are end of the ram to centre of the tip of sensors by label.
@@ -193,6 +194,7 @@ class Machine:
     still_macros: frozenset[str] = frozenset()
     bracket_comments: bool = False
     still_m_codes: frozenset[int] = frozenset()
+    still_g_codes: frozenset[int] = frozenset()
     path_mode: Literal["blend", "exact-stop"] = "blend"
     blend_mm: float | None = None
     tool_change_moves: frozenset[str] = frozenset("XYZ")

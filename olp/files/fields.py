@@ -130,6 +130,12 @@ def _still_m(number: int) -> int:
     return number
 
 
+def _still_g(number: float) -> float:
+    if abs(number * 10 - round(number * 10)) > 1e-6:
+        raise refusal(f"has {number:g}; expected numbers with one decimal at most, such as 64.1")
+    return number
+
+
 def _offset_name(name: str) -> str:
     if name not in _USUAL and re.match(r"[Gg]\d", name) and not _G_OFFSET.fullmatch(name):
         raise refusal('is not a work offset; expected G54 to G59, "G59.1" (in quotes), "G54.1 P1" ...')
@@ -165,6 +171,8 @@ IsoNames = Annotated[
 ToolNumber = Annotated[str, After(_tool_number), Shown({"type": "string", "pattern": f"^{_TOOL_NUMBER}$"})]
 #: The number of an M code that moves no axis.
 StillM = Annotated[int, Field(ge=0, le=9999), After(_still_m)]
+#: The number of a G code that moves no axis.
+StillG = Annotated[float, Field(ge=0, le=299.8), After(_still_g)]
 OffsetName = Annotated[str, Field(min_length=1), After(_offset_name)]
 Chain = Annotated[str, Before(_chain), Field(shown={"enum": sorted(CHAINS)})]
 Controller = Annotated[str, Before(_controller), Field(shown={"enum": [*CONTROLLER_NAMES]})]

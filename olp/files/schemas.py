@@ -21,6 +21,7 @@ from olp.files.fields import (
     IsoNames,
     OffsetName,
     ProgramDialect,
+    StillG,
     StillM,
     ToolNumber,
 )
@@ -343,6 +344,11 @@ class MachineFile(Table):
         default=[],
         description="the M codes of the machine's builder that move no axis, by their numbers, such as "
         "[65, 81]; behind other codes that are not known no position is known",
+    )
+    still_g_codes: list[StillG] = Field(
+        default=[],
+        description="the G codes that the dialect does not know and that move no axis and change no mode of "
+        "the path on this machine, by their numbers, such as [187, 64.1]; other unknown codes are refused",
     )
     bracket_comments: bool = Field(
         default=False,

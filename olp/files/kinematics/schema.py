@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from olp.core.schema import Interval, Positive, Table, Text, Triple
 from olp.core.schema_keys import After, Field, Known, refusal, rule
-from olp.files.fields import CONTROLLERS, Controller, StillM
+from olp.files.fields import CONTROLLERS, Controller, StillG, StillM
 from olp.files.schemas import JobDefaultsTable, Tools, WorkOffsets
 
 #: Axes that are linear where their table does not say.
@@ -229,6 +229,11 @@ class JointMachineFile(Table):
         default=[],
         description="the M codes of the machine's builder that move no axis, by their numbers, such as "
         "[65, 81]; behind other codes that are not known no position is known",
+    )
+    still_g_codes: list[StillG] = Field(
+        default=[],
+        description="the G codes that the dialect does not know and that move no axis and change no mode of "
+        "the path on this machine, by their numbers, such as [187, 64.1]; other unknown codes are refused",
     )
     calibration: Text | None = Field(
         default=None, description="the path of the calibration file, relative to this file"

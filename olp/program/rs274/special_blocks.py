@@ -59,6 +59,8 @@ _TOOL_CODES = frozenset({60, 610})
 _WORD = np.dtype([("letter", np.uint8), ("value", np.float64), ("pointed", np.bool_)])
 _CODE = np.dtype([("code", np.int64), ("act", np.int64)])
 _WORD_PARTS = Struct("=Bd?")
+#: Letters of axes and of centres.
+_WHERE = frozenset("XYZABCUVWIJK")
 _CODE_PARTS = Struct("=qq")
 
 
@@ -147,7 +149,7 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
             spline = c in SPLINES and profile.language.splines and bool(unroll)
             holes = c in HOLE_PATTERNS and profile.language.hole_patterns
             unrolled = c in MACROS or (c == POLAR and profile.polar) or spline or holes
-            why = why or f"{name} is not known to the {profile.name} profile and may move the machine"
+            why = why or _unknown(name, c, words, profile)
             raise ProgramError(
                 why if unrolled and unroll else remedied(why),
                 line=line,
@@ -180,8 +182,27 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
     return [c for c, a in codes if a == Act.EVENT]
 
 
+def _has_axes(words: list[Word]) -> bool:
+    return any(word.letter in _WHERE for word in words)
+
+
+def _unknown(name: str, code: int, words: list[Word], profile: Profile) -> str:
+    """Why a code of no table is refused."""
+    if code in profile.still_g:
+        return f"{name} is one of still_g_codes, and its block has words of axes; put them into another block"
+    why = f"{name} is not known to the {profile.name} profile and may move the machine"
+    if name != f"G{code / 10:g}" or profile.commands is not None or _has_axes(words):
+        return why
+    return (
+        f"{why}; post the program without it, or list it in still_g_codes of the machine file where it moves "
+        "no axis and changes no mode of the path"
+    )
+
+
 def _still(code: int, words: list[Word], profile: Profile) -> bool:
     """Whether a code that is refused elsewhere changes nothing of the path in this block."""
+    if code in profile.still_g:
+        return not _has_axes(words)
     letter, values = profile.still_with.get(code, ("", frozenset[float]()))
     own = {word.letter: word.value for word in words if word.letter not in "GN"}
     return bool(letter) and own.keys() == {letter} and own[letter] in values

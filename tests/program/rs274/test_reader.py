@@ -255,6 +255,10 @@ PERCENT = (
 )
 #: what to do where a code has no remedy of its own
 ALONE = "; post the program without it"
+_LISTED = (
+    "list it in still_g_codes of the machine file where it moves no axis and changes no mode of the path"
+)
+OR_LISTED = f"{ALONE}, or {_LISTED}"
 NO_MOTION = "a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3"
 UNKNOWN = f"an arc starts or ends where an axis has not been commanded yet; {KNOWN_BY}"
 #: Control and text behind `HEAD`: the line, the sentence, the code, and what else the refusal names.
@@ -303,7 +307,7 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("linuxcnc", "%"): {"why": PERCENT, "code": "OLP505"},
     ("linuxcnc", "G68 X1 R2"): {"why": f"G68 (rotation) is not read{ALONE}", "code": "OLP512", "word": "G68"},
     ("linuxcnc", "G2.5"): {
-        "why": f"G2.5 is not known to the linuxcnc profile and may move the machine{ALONE}",
+        "why": f"G2.5 is not known to the linuxcnc profile and may move the machine{OR_LISTED}",
         "code": "OLP512",
         "word": "G2.5",
     },

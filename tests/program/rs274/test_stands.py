@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from judge.machines import Recipe
 from judge.path import judge_programs
 
 import olp
-from olp.core.errors import ConfigError, ProgramError
+from olp.core.errors import ConfigError, ProgramError, Refused
 
 SQUARE = "[squareness]\nC0Y_urad = 1000.0\n"
 TOOL = f"{TRUE_ZERO}[tools.1]\nZ_mm = 100.0\n"
@@ -142,3 +143,46 @@ def test_codes_of_the_builder_that_move_nothing_are_stated(tmp_path: Path, contr
 def test_a_tool_change_is_no_such_code(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="what a tool change moves is stated by tool_change_moves"):
         corrected(tmp_path, "G0 X1. Y1. Z1.\n", keys="still_m_codes = [81, 6]\n")
+
+
+#: Codes of a builder beside those of the control, and in a block of their own.
+OWN_CODES = "G90 G94 G64.1 G17\nG0 X10. Y10. Z9.\nG1 X30. F100\nG187\nG2 X30. Y30. I0. J10.\n"
+OWN_KEY = "still_g_codes = [187, 64.1]\n"
+
+
+def without(text: str) -> str:
+    return re.sub(r" G64\.1|G187\n", "", text)
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", "grbl", "mach3"])
+def test_g_codes_that_move_nothing_are_stated(tmp_path: Path, controller: str) -> None:
+    """The program without these codes is the judge."""
+
+    def of(name: str, text: str, keys: str = "") -> str:
+        keys += 'arc_centres = "incremental"\n'
+        return corrected(tmp_path / name, text, keys=keys, controller=controller)
+
+    with pytest.raises(Refused, match="list it in still_g_codes of the machine file") as caught:
+        of("unknown", OWN_CODES)
+    assert [(reason.line, reason.code) for reason in caught.value.reasons] == [(3, "OLP512"), (6, "OLP512")]
+    stated = of("stated", OWN_CODES, OWN_KEY)
+    assert "G187" in stated
+    assert without(stated) == of("plain", without(OWN_CODES)) != without(OWN_CODES)
+
+
+@pytest.mark.parametrize(
+    ("keys", "text", "why"),
+    [
+        (
+            "[187, 68]",
+            "G0 X1.",
+            "still_g_codes of the machine file has G68, which the linuxcnc profile knows",
+        ),
+        ("[50.25]", "G0 X1.", "has 50.25; expected numbers with one decimal at most"),
+        ("[50]", "G0 X1. Y1. Z1.\nG50 X2.", "G50 is one of still_g_codes, and its block has words of axes"),
+        ("[50]", "G0 X1. Y1. Z1.\nG51 X2.", "G51 (scaling) is not read"),
+    ],
+)
+def test_other_g_codes_are_none_of_them(tmp_path: Path, keys: str, text: str, why: str) -> None:
+    with pytest.raises((ConfigError, ProgramError), match=re.escape(why)):
+        corrected(tmp_path, text + "\n", keys=f"still_g_codes = {keys}\n")

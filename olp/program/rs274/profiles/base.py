@@ -14,6 +14,7 @@ from functools import cache
 from typing import Any, TypeVar
 
 from olp.core.arrays import Array
+from olp.core.errors import ConfigError
 from olp.core.machine import Machine
 from olp.core.patterns import pattern
 from olp.core.toolpath import Interpolated
@@ -100,6 +101,8 @@ class Profile(Dialect):
       level and R, and the G codes that do the same elsewhere.
     - `still_with`: codes that are refused but for a block of their own with this letter and one of its
       numbers, where they change nothing of the path.
+    - `still_g`: codes of no table that the machine file states to change nothing of the path, ten times their
+      numbers.
     - `lathe_words`: letters that together beside codes show a program of a lathe, and what they do there.
     - `cycles_apart`: canned cycles and G80 are a separate modal group.
     - `axis_dwell`: G4 takes its time from X and U, too, and counts milliseconds where it has no point.
@@ -187,6 +190,7 @@ class Profile(Dialect):
     return_level: int = 0
     return_modes: Mapping[int, int] = field(default_factory=dict)
     still_with: Mapping[int, tuple[str, frozenset[float]]] = field(default_factory=dict)
+    still_g: frozenset[int] = frozenset()
     lathe_words: Mapping[int, tuple[str, str]] = field(default_factory=dict)
     cycles_apart: bool = False
     axis_dwell: bool = False
@@ -285,6 +289,14 @@ class Profile(Dialect):
             profile = replace(profile, motion=int(machine.default_motion[1:]))
         if machine.still_m_codes:
             profile = replace(profile, harmless_m=self.harmless_m | machine.still_m_codes)
+        if machine.still_g_codes:
+            known = sorted(machine.still_g_codes & (self.codes.keys() | self.aliases.keys()))
+            if known:
+                raise ConfigError(
+                    f"still_g_codes of the machine file has G{known[0] / 10:g}, which the {self.name} "
+                    "profile knows; expected codes that it does not know"
+                )
+            profile = replace(profile, still_g=machine.still_g_codes)
         if machine.bracket_comments and self.brackets_by_option:
             profile = replace(profile, text=replace(self.text, brackets=True))
         if self.language.user_tasks and not self.counts_increments(machine):
