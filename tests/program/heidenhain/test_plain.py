@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import cmath
+import math
 from pathlib import Path
 
 import numpy as np
@@ -267,6 +269,33 @@ def test_the_tool_is_at_its_radius_beside_the_contour(
     assert tool[-1].end == pytest.approx(
         contour[-1].end + contour[-1].heading(1) * 1j * radius * (-1 if mirror else 1)
     )
+
+
+def rounded_contour(angle: float) -> str:
+    """A line, a quarter of a circle in three parts, a line of 0.03 mm and a long one. They meet but for their
+    digits, as CAM systems write them."""
+    turned = cmath.exp(1j * angle)
+    corner, size = 60.0 + 6.0j, 6.013
+    places = [corner + size * cmath.exp(1j * math.radians(part - 90)) for part in (0, 31, 62, 90)]
+    ends = [*places, places[-1] + 0.031j, places[-1] + 40j]
+    xy = [f"X{(turned * end).real:+.3f} Y{(turned * end).imag:+.3f}" for end in ends]
+    centre = f"CC X{(turned * corner).real:+.3f} Y{(turned * corner).imag:+.3f}"
+    start = turned * (places[0] - 50)
+    first = turned * (places[0] - 70)
+    return (
+        f"L X{first.real:+.3f} Y{first.imag:+.3f} Z+5 R0 FMAX\n"
+        f"L X{start.real:+.3f} Y{start.imag:+.3f} RL F300\n"
+        f"L {xy[0]}\n" + "".join(f"{centre}\nC {end} DR+\n" for end in xy[1:4]) + f"L {xy[4]}\nL {xy[5]}\n"
+    )
+
+
+@pytest.mark.parametrize("angle", some_fast([0.1 * n for n in range(60)], 6))
+@pytest.mark.parametrize("radius", ["0", "0.01", "0.5"])
+def test_pieces_that_meet_but_for_their_digits_are_smooth(bent: Path, angle: float, radius: str) -> None:
+    text = f"TOOL CALL 1 Z DR{float(radius) - 5.0:+.3f}\n" + rounded_contour(angle) + "L X+0 Y-90 R0\n"
+    contour = heidenhain_contours.read(text.replace(" RL", "").encode())[2:-1]
+    tool = heidenhain_contours.read(olp.flatten(text.encode(), bent))[2:-1]
+    assert heidenhain_sides.off_by(contour, tool, float(radius)) < 2e-3
 
 
 @pytest.mark.parametrize(

@@ -63,13 +63,17 @@ class Piece:
             return Piece(start, end)
         return Piece(start, end, self.centre, self.sweep * (self.share(end) - self.share(start)))
 
-    def carrier(self, off: float) -> Carriers:
-        """What lies beside the piece, to the left of it by `off`."""
+    def carrier(self, off: float, *, last: bool = False) -> Carriers:
+        """What lies beside the piece, to the left of it by `off`. That of an arc goes through its start, with
+        `last` through its end, which digits may put on another circle."""
         heading = self.heading(last=True)
         assert heading is not None
         along = np.array([[math.cos(heading), math.sin(heading)]])
         point = np.array([self.end]) + off * np.array([[-math.sin(heading), math.cos(heading)]])
-        size = self.size - math.copysign(off, self.sweep * off) if self.sweep else 0.0
+        size = 0.0
+        if self.sweep:
+            size = math.dist(self.end if last else self.start, self.centre)
+            size -= math.copysign(off, self.sweep * off)
         return Carriers(
             np.array([self.sweep != 0.0]), point, along, np.array([self.centre]), np.array([max(size, 0.0)])
         )

@@ -20,6 +20,8 @@ from olp.program.heidenhain.plain.path import Piece, Point, turn_between
 
 #: rad; at a smaller turn there is no arc about an outside corner: 0.5 um at a radius of 10 mm
 _SMOOTH_RAD = 0.02
+#: mm; the tool's ends on two pieces that are closer are one point
+_SAME_POINT = 1e-9
 #: by which the order of ends on a piece may be off, as a share of it
 _OFF = 1e-9
 #: what changes the corners of a contour
@@ -121,14 +123,17 @@ def _pieces(moves: list[Entry]) -> tuple[list[Piece], list[Piece | None]]:
         if abs(turn) >= _SMOOTH_RAD and turn * off < 0:
             corners[k + 1] = Piece(ends[k], begins[k + 1], a.end, turn)
             continue
-        found = meeting(a.carrier(off), b.carrier(off), np.array([a.end]))[0]
-        if not np.isnan(found).any():
-            ends[k] = begins[k + 1] = (float(found[0]), float(found[1]))
-        elif abs(turn) < _SMOOTH_RAD:
-            x, y = (np.array(ends[k]) + np.array(begins[k + 1])) / 2
-            ends[k] = begins[k + 1] = (float(x), float(y))
-        else:
+        gap = math.dist(ends[k], begins[k + 1])
+        middle = (np.array(ends[k]) + np.array(begins[k + 1])) / 2
+        found = middle
+        if gap > _SAME_POINT:
+            found = meeting(a.carrier(off, last=True), b.carrier(off), np.array([a.end]))[0]
+        # digits alone may put the place where two smooth pieces meet far away, or nowhere
+        if abs(turn) < _SMOOTH_RAD and not math.dist(found, middle) <= gap:
+            found = middle
+        if not np.isfinite(found).all():
             raise _not_fitting(off, moves[k + 1])
+        ends[k] = begins[k + 1] = (float(found[0]), float(found[1]))
     made = [given[0] if moves[0].centre else Piece(begins[0], ends[0])]
     for entry, piece, begin, end in zip(moves[1:], given[1:], begins[1:], ends[1:], strict=True):
         made.append(_between(piece, begin, end, off, entry))
