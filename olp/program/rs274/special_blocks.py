@@ -308,8 +308,13 @@ class SpecialBlocks:
                 )
             incremental = False
             if motion not in (0, 10):
+                stated = (
+                    "" if motion >= 0 else ', or motion = "G0" or "G1" in [job_defaults] of the machine file'
+                )
                 raise ProgramError(
-                    "G53 takes G0 or G1 only; give one of them in the block", line=line, code="OLP518"
+                    f"G53 takes G0 or G1 only; give one of them in the block{stated}",
+                    line=line,
+                    code="OLP518",
                 )
             kind = Kind(motion // 10)
             flag |= Flag.PASS | Flag.MACHINE

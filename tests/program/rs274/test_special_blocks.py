@@ -73,6 +73,17 @@ def test_g53_is_refused_in_g91_and_with_other_motion(setup: Setup) -> None:
     assert "G53 takes G0 or G1 only" in refused("G53 G2 X7 I3 F60\n", setup)
 
 
+def test_g53_before_any_motion_code_takes_the_stated_one(setup: Setup) -> None:
+    stated = 'or motion = "G0" or "G1" in [job_defaults] of the machine file'
+    # behind a code the start is past
+    for before, helps in (("", True), ("G80\n", False)):
+        with pytest.raises(ProgramError, match="G53 takes G0 or G1 only") as caught:
+            read(f"G21 G90\n{before}G53 X7\n".encode(), setup, DIALECTS["linuxcnc"])
+        assert (stated in str(caught.value)) is helps
+    told = replace(setup, machine=replace(setup.machine, default_motion="G0"))
+    assert read(b"G21 G90\nG53 X7\n", told, DIALECTS["linuxcnc"]).toolpath.kind.tolist() == [Kind.RAPID]
+
+
 def test_g28_goes_to_its_point_and_then_where_the_machine_has_it(setup: Setup) -> None:
     assert ends("G28 Z9\n", setup) == [[101.0, 202.0, 309.0], [101.0, 202.0, None]]
     assert ends("G91 G28 Z9\n", setup)[0] == [101.0, 202.0, 312.0]
