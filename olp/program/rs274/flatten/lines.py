@@ -182,7 +182,9 @@ def _compile(source: _Source, begin: int, language: Language) -> Line:
             if reader.position < len(text):
                 rest = text[reader.position : reader.position + _SHOWN]
                 raise ProgramError(
-                    f"{flow.keyword.upper()} is followed by {rest!r}, which is not understood", code="OLP510"
+                    f"{_written(flow)} is followed by {rest!r}, which is not understood; put it into a block "
+                    "of its own",
+                    code="OLP510",
                 )
             break
         words.append(_word(reader, source.places, language))
@@ -190,6 +192,11 @@ def _compile(source: _Source, begin: int, language: Language) -> Line:
         source.number, source.raw, source.eol, deleted=source.deleted, words=tuple(words),
         assignments=tuple(assignments), flow=flow, comments=source.comments,
     )  # fmt: skip
+
+
+def _written(flow: Flow) -> str:
+    """The last word of a statement, as programs write it."""
+    return flow.keyword.rsplit("-", 1)[-1].upper()
 
 
 def _word(reader: Reader, places: list[int], language: Language) -> Word:

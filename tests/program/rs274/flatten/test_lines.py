@@ -118,8 +118,16 @@ def test_what_is_flow_of_one_language_is_words_of_the_other() -> None:
         ("o1 abcdefghijklmnop", "OLP542", "O-word without a known keyword at 'abcdefghijkl'"),
         ("o<a>", "OLP542", "O-word without a known keyword at ''"),
         ("/o1 blah", "OLP542", "O-word without a known keyword at 'blah'"),
-        ("o1 else X5", "OLP510", "ELSE is followed by 'x5', which is not understood"),
-        ("o1 else " + "X5" * 99, "OLP510", f"ELSE is followed by '{'x5' * 30}', which is not understood"),
+        (
+            "o1 else X5",
+            "OLP510",
+            "ELSE is followed by 'x5', which is not understood; put it into a block of its own",
+        ),
+        (
+            "o1 else " + "X5" * 99,
+            "OLP510",
+            f"ELSE is followed by '{'x5' * 30}', which is not understood; put it into a block of its own",
+        ),
         ("#1", "OLP510", "a parameter without '=' is where a word is expected"),
         ("X1 #1 Y2", "OLP510", "a parameter without '=' is where a word is expected"),
         ("#1=5!abcdefghijklmnop", "OLP510", "expected a word at '!abcdefghijk'"),

@@ -379,8 +379,21 @@ def test_flow_of_macro_b(source: str, expected: str) -> None:
         ("WHILE[0]DO1", "OLP542", "no END with label 1 follows"),
         ("GOTO5", "OLP542", "GOTO 5: the program has no block N5"),
         ("GOTO5.5", "OLP540", "the block number of GOTO is 5.5; expected an integer"),
-        ("GOTO#1X1", "OLP510", "GOTO is followed by 'x1', which is not understood"),
-        ("IF[1EQ1]THEN#1=2X1", "OLP510", "WHEN-THEN is followed by 'x1', which is not understood"),
+        (
+            "WHILE[1EQ1]DO1X1",
+            "OLP510",
+            "DO is followed by 'x1', which is not understood; put it into a block of its own",
+        ),
+        (
+            "GOTO#1X1",
+            "OLP510",
+            "GOTO is followed by 'x1', which is not understood; put it into a block of its own",
+        ),
+        (
+            "IF[1EQ1]THEN#1=2X1",
+            "OLP510",
+            "THEN is followed by 'x1', which is not understood; put it into a block of its own",
+        ),
     ],
 )
 def test_flow_of_macro_b_that_is_refused(source: str, code: str, message: str) -> None:
