@@ -111,6 +111,12 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         {FANUC: (1, 2, 0), HAAS: "high-speed mode"},
         {FANUC: {}, HAAS: {50: ("P", frozenset({0.0, 10000.0}))}},
     ),
+    # what the machine file states, which no control has by itself
+    "still_g": (
+        "G187\nG0 X1. Y0. Z0.",
+        dict.fromkeys((LINUXCNC, GRBL), "G187 is not known to the"),
+        dict.fromkeys((LINUXCNC, GRBL), frozenset({1870})),
+    ),
     "machine_moves_absolute": (
         "G0 X1. Y2. Z3.\nG91\nG53 G0 X5.\nG0 X1.",
         {GRBL: (6, 2, 3)}
