@@ -347,8 +347,8 @@ class MachineFile(Table):
     )
     still_g_codes: list[StillG] = Field(
         default=[],
-        description="the G codes that the dialect does not know and that move no axis and change no mode of "
-        "the path on this machine, by their numbers, such as [187, 64.1]; other unknown codes are refused",
+        description="the G codes that the dialect does not know, and that move no axis and change no mode, "
+        "by their numbers, such as [187, 64.1]",
     )
     bracket_comments: bool = Field(
         default=False,
