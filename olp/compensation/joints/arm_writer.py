@@ -42,6 +42,10 @@ from olp.program.text.numbers import MOST_DECIMALS, number, spliced, written
 _RIGHT = 0.5 + 1e-6
 #: mm and rad by which a pose is off from computing alone
 _COMPUTED = 1e-8
+#: By decimals: the last digit, and how far it goes.
+_DIGITS = tuple((10.0**-k, max(10.0**-k, _COMPUTED)) for k in range(MOST_DECIMALS + 1))
+#: Numbers of a place.
+_PLACE = 3
 #: Groups of moves that a move is compared with, where none wants the very same digits.
 _COMPARED = 8
 #: A branch that is nearer to its border than this says nothing, mm or deg.
@@ -91,7 +95,8 @@ class _Writer:
         assert targets is not None
         assert held is not None
         self.path, self.plan, self.program, self.targets = path, plan, program, targets
-        self.limits, self.stands = limits, plan.stands
+        self.data, self.limits, self.stands = program.data, limits, plan.stands
+        self.moves: list[int] = plan.move.tolist()
         self.dialect, self.held, self.arm, self.tally = program.dialect, held, held.arm, Tally()
         self.nominal, self.commands = (held.own(axes).tolist() for axes in (path.end, plan.command))
         self.clones = self.made = 0
@@ -181,7 +186,7 @@ class _Writer:
         return self.targets.targets[self._use(row).target]
 
     def _use(self, row: int) -> Use:
-        use = self.targets.uses[int(self.plan.move[row])]
+        use = self.targets.uses[self.moves[row]]
         assert use is not None
         return use
 
@@ -216,7 +221,7 @@ class _Writer:
     def _wanted(self, row: int, place: Vector, turn: Quaternion, *, shifted: bool) -> _Wanted:
         """The numbers of a target with which a row brings the tip to a place in its frame, turned so; without
         `shifted` those of the pose itself."""
-        move, use = int(self.plan.move[row]), self._use(row)
+        move, use = self.moves[row], self._use(row)
         target, shift = self.targets.targets[use.target], ZERO
         if shifted:
             if use.turn != target.turn:
@@ -230,7 +235,7 @@ class _Writer:
         return self._in_digits(row, target, numbers, angle_between(turn, target.turn), move)
 
     def _numbers(self, spans: tuple[Span, ...]) -> list[float]:
-        return [_value(self.program.data[a:b]) for a, b in spans]
+        return [_value(self.data[a:b]) for a, b in spans]
 
     def _unit(self, move: int) -> float:
         toolpath = self.program.toolpath
@@ -259,37 +264,41 @@ class _Writer:
     ) -> _Wanted:
         """Numbers as they are written: those that are right to their last digit keep their bytes. The words
         of the target are those of a move."""
-        dialect, values, digits, texts = self.dialect, [], [], []
-        for k, (span, value) in enumerate(zip((*target.numbers, *target.turned), numbers, strict=True)):
-            fewest = dialect.turn_decimals if k > 2 else dialect.decimals
-            off = None if k < 3 else turned_rad / dialect.turn_unit_rad
-            own, digit, text = self._written(span, value, fewest, off)
-            values.append(own)
-            digits.append(digit)
-            texts.append(text)
-        return _Wanted(tuple(values), tuple(digits), tuple(texts), self._turns(row, target, move))
+        dialect, off = self.dialect, turned_rad / self.dialect.turn_unit_rad
+        made = [
+            self._written(span, value, dialect.decimals)
+            for span, value in zip(target.numbers, numbers, strict=False)
+        ]
+        made += [
+            self._written(span, value, dialect.turn_decimals, off)
+            for span, value in zip(target.turned, numbers[_PLACE:], strict=True)
+        ]
+        values, digits, texts = zip(*made, strict=True)
+        return _Wanted(values, digits, texts, self._turns(row, target, move))
 
     def _written(
         self, span: Span, value: float, fewest: int, off: float | None = None
     ) -> tuple[float, float, bytes]:
         """The value of a number, its last digit, and how it is written in place of another one, which is
         `off` by so much."""
-        text = self.program.data[slice(*span)]
-        plain = _PLAIN.fullmatch(text)
-        form = None if plain else number(text)
-        if plain is None and (form is None or form.letter):
-            form = number(b"0.0")
-        own = len(plain[1] or b"") if plain else 0 if form is None else form.decimals
+        text = self.data[span[0] : span[1]]
+        plain, form = _PLAIN.fullmatch(text), None
+        if plain is not None:
+            own = len(plain[1] or b"")
+        else:
+            form = number(text)
+            if form is None or form.letter:
+                form = number(b"0.0")
+            own = 0 if form is None else form.decimals
         decimals = min(max(fewest, own), MOST_DECIMALS)
-        digit = 10.0**-decimals
-        off = abs(_value(text) - value) if off is None else off
-        if off <= max(_RIGHT * digit, _COMPUTED):
-            return _value(text), max(digit, _COMPUTED), text
+        digit, least = _DIGITS[decimals]
+        if (abs(_value(text) - value) if off is None else off) <= max(_RIGHT * digit, _COMPUTED):
+            return _value(text), least, text
         if form is None and abs(value) > digit:
-            return value, max(digit, _COMPUTED), b"%.*f" % (decimals, value)
+            return value, least, b"%.*f" % (decimals, value)
         form = form or number(text)
         assert form is not None
-        return value, max(digit, _COMPUTED), written(form, value, decimals)
+        return value, least, written(form, value, decimals)
 
     def _turns(self, row: int, target: Target, move: int) -> tuple[bytes, ...]:
         if not target.turns:
@@ -326,7 +335,7 @@ class _Writer:
         return [
             (a, b, text)
             for (a, b), text in zip(spans, (*wanted.texts, *wanted.turns), strict=True)
-            if text != self.program.data[a:b]
+            if text != self.data[a:b]
         ]
 
     def _cloned(self, target: Target, wanted: _Wanted, rows: list[int]) -> list[Replacement]:
@@ -345,7 +354,7 @@ class _Writer:
 
     def _part(self, row: int, wanted: _Wanted) -> list[Replacement]:
         """The statement of a part of a move before its end."""
-        move, use = int(self.plan.move[row]), self._use(row)
+        move, use = self.moves[row], self._use(row)
         target = self.targets.targets[use.target]
         x, y, z, *turned = wanted.texts
         share = float(self.plan.share[row])
