@@ -179,7 +179,8 @@ def _better(run: Run, solver: Solver, best: Solution | None, own: Run | None = N
     """The solver's solution for the run, or for its variant `own`, if it is valid for the run and faster than
     the best so far; else the best so far."""
     motion = _tried(lambda: solver.solve(own or run))
-    if motion is None:
+    # one that is slower even without a slow-down needs no audit
+    if motion is None or (best is not None and motion.duration_s >= best.duration_s):
         return best
     motion = motion if own in {None, run} or solver.bends else shared(motion)
     used = ratios(motion, run.limits, run.route.feed_mm_s[motion.line])
