@@ -217,7 +217,7 @@ def outcome(taken: Measurements, clean: FittedCalibration, blunder: Blunder) -> 
         named = bool(blunder.words) and blunder.words in str(error)
         return Outcome(size.noncentrality, size.redundancy, ("refused",), named)
     alarms = tuple(sorted({one.code for one in fitted.findings if one.code in ALARMS}))
-    words = [one.message for one in fitted.findings if one.code == "OLP810"]
+    words = [one.message for one in fitted.findings if one.code in {"OLP810", "OLP811"}]
     source = blunder.planted.source
     named = any(one.startswith(source) and blunder.words in one for one in words)
     stated = max(row["hidden_harm_um"] for row in fitted.report["agreement"] if row["file"] == source)

@@ -111,6 +111,8 @@ CASES = {
     "polar": polar("F C X Z"),
     "polar table": polar("C F Z X"),
     "arm": arm("pumakins", PUMA, (20.0, -60.0, 40.0, 20.0, 70.0, 0.0)),
+    # its module searches, to about 1e-5 mm
+    "arm by a search": arm("genserkins", SERIAL, (20.0, -60.0, 40.0, 20.0, 70.0, 0.0)),
 }
 
 
@@ -218,7 +220,7 @@ def nearest(words: np.ndarray, control: Control, tool: np.ndarray) -> tuple[floa
         "arm",
         *(
             pytest.param(kind, marks=pytest.mark.campaign)
-            for kind in ("scara to the left", "polar", "polar table")
+            for kind in ("scara to the left", "polar", "polar table", "arm by a search")
         ),
     ],
 )

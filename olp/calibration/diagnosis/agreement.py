@@ -96,6 +96,16 @@ class Agreement:
         return ", or ".join(tried.words for tried in near)
 
     @property
+    def likely(self) -> str:
+        """In words what explains nearly all that it contradicts though the others do not confirm it, with all
+        that is not excluded against that."""
+        best = max((tried.log_odds for tried in self.tried if tried.sought), default=-np.inf)
+        if best <= max(NAMED, _EXPLAINS * self.against):
+            return ""
+        near = [tried for tried in self.tried if tried.sought and tried.log_odds > best - EXCLUDED]
+        return ", or ".join(tried.words for tried in near)
+
+    @property
     def contradicts(self) -> bool:
         """Whether it is better to leave it out than to believe it, whatever is wrong with it."""
         return self.misfit.failed and self.against > NAMED

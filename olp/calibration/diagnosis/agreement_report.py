@@ -37,7 +37,8 @@ def agreement_findings(found: Compared, fit: Fit, tools: Sequence[Vector]) -> It
         yield Finding(
             "OLP811",
             f"{_name(one)}: it differs from what all other readings say by "
-            f"{math.sqrt(one.misfit.reduced):.1f} times what both uncertainties explain",
+            f"{math.sqrt(one.misfit.reduced):.1f} times what both uncertainties explain"
+            + (f"; it may be that {one.likely}, which they do not confirm" if one.likely else ""),
         )
     costs = sorted(
         ((harm, _name(one), kind) for one, (harm, kind) in _harms(found, fit, tools)), reverse=True

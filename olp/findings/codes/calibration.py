@@ -107,11 +107,11 @@ RULES = (
         "OLP811",
         "a source of readings contradicts all others",
         Severity.ERROR,
-        "All other readings predict this source, and what it says is far off. No single mistake of sign, "
-        "unit, order, scale, column, place or lever arm explains it. It may be of another machine or day. Or "
-        "the machine bends.",
-        "Check place, reflector, machine and date of this file. Fit without it, or with --map where points "
-        "show that the machine bends.",
+        "All other readings predict this source, and what it says is far off. They confirm no single mistake "
+        "of sign, unit, order, scale, column, place or lever arm. One that explains nearly all of it is "
+        "stated. It may be of another machine or day. Or the machine bends.",
+        "Check place, reflector, machine and date of this file, and what is stated. Fit without it, or with "
+        "--map where points show that the machine bends.",
         "A line of Z taken on the sister machine.",
     ),
     _rule(

@@ -124,6 +124,21 @@ def test_a_cause_that_is_not_sought_is_listed_and_never_named() -> None:
         assert one.possible == ("place",)
 
 
+def test_a_cause_that_the_others_do_not_confirm_is_stated_and_not_named() -> None:
+    """As a wrong unit of an angle that little checks: leaving it out is as good."""
+    misfit = Fitted("eax.csv", 60.0, 8.0)
+    unit = Tried("unit", "its values are mm/m, taken as um/m", 67.5, -1.9)
+    for tried, likely in (
+        (unit, unit.words),
+        # it explains too little of what is contradicted, or too little at all
+        (dataclasses.replace(unit, log_odds=60.0), ""),
+        (dataclasses.replace(unit, sought=False), ""),
+    ):
+        one = Agreement("eax.csv", "EAX", misfit, (tried,), 69.4)
+        assert one.named is None and one.contradicts
+        assert one.likely == likely
+
+
 def test_what_explains_a_wrong_source_best_is_named_even_if_it_is_not_sought() -> None:
     """Half of its values explains a line read elsewhere in part; that it was read elsewhere, in full. What is
     less than 100 times as probable as the other is told with it."""

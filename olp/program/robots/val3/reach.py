@@ -54,8 +54,9 @@ class Reach:
         self._spread()
         first = application.first
         self.task = None if first is None else self._only_mover(first)
-        if first is not None and self.task is not None:
-            self._calls[first.name].append(self._begun_by(self.task).name)  # type: ignore[union-attr]
+        begun = None if self.task is None else self._begun_by(self.task)
+        if first is not None and begun is not None:
+            self._calls[first.name].append(begun.name)
         self._count = self._counted(first)
         self.beside = self._beside(first)
         self.elsewhere: dict[str, str] = {}
