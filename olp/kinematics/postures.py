@@ -218,7 +218,8 @@ def two_turns(
     axis: Array, lower: Array, upper: Array, reach: Array, pick: Pick = both
 ) -> list[tuple[Array, Array]]:
     """(n,) both pairs of angles about `axis` (3,) by which two links (3,), one behind the other, end at
-    vectors `reach` (n, 3) across the axis, or those whose second is picked; NaN where there are none."""
+    vectors `reach` (n, 3) across the axis. NaN where there are none. With `pick` those whose second is picked
+    are given alone."""
     lower, upper, reach = (v - (v @ axis)[..., None] * axis for v in (lower, upper, reach))
     want = (np.sum(reach * reach, axis=1) - lower @ lower - upper @ upper) / 2.0
     pairs = []
