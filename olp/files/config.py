@@ -142,7 +142,7 @@ def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, 
         lengths_along_z=file.lengths_along_z,
         bracket_comments=file.bracket_comments,
         still_m_codes=frozenset(file.still_m_codes),
-        still_g_codes=frozenset(round(10 * code) for code in file.still_g_codes),
+        still_g_codes=in_tenths(file.still_g_codes),
         still_macros=frozenset(name.upper() for name in file.still_macros),
         axes=axes,
         calibration=beside(path, file.calibration),
@@ -194,6 +194,11 @@ def have_joints(machine: PathLike | None, job: PathLike | None, read: Reader = r
 def moved_by_change(stated: bool | Sequence[str]) -> frozenset[str]:
     """The axes that M6 may move, from the key `tool_change_moves`."""
     return frozenset(AXES if stated else ()) if isinstance(stated, bool) else frozenset(stated)
+
+
+def in_tenths(codes: Sequence[float]) -> frozenset[int]:
+    """Ten times the numbers of G codes, as dialects have them."""
+    return frozenset(round(10 * code) for code in codes)
 
 
 def _compliance(stated: float | Vector, axis: int) -> Vector:

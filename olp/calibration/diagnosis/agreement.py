@@ -11,7 +11,7 @@ compared by the evidence of all readings (D. J. C. MacKay, Neural Computation 4,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field
 
 import numpy as np
@@ -92,18 +92,15 @@ class Agreement:
         best = self.named
         if best is None:
             return ""
-        near = [one for one in self.tried if one.beyond_doubt and one.log_odds > best.log_odds - EXCLUDED]
-        return ", or ".join(tried.words for tried in near)
+        return _in_words((one for one in self.tried if one.beyond_doubt), best.log_odds)
 
     @property
     def likely(self) -> str:
         """In words what explains nearly all that it contradicts though the others do not confirm it, with all
         that is not excluded against that."""
-        best = max((tried.log_odds for tried in self.tried if tried.sought), default=-np.inf)
-        if best <= max(NAMED, _EXPLAINS * self.against):
-            return ""
-        near = [tried for tried in self.tried if tried.sought and tried.log_odds > best - EXCLUDED]
-        return ", or ".join(tried.words for tried in near)
+        sought = [tried for tried in self.tried if tried.sought]
+        best = max((tried.log_odds for tried in sought), default=-np.inf)
+        return _in_words(sought, best) if best > max(NAMED, _EXPLAINS * self.against) else ""
 
     @property
     def contradicts(self) -> bool:
@@ -125,6 +122,11 @@ class Agreement:
     def possible(self) -> tuple[str, ...]:
         """The kinds of what is open."""
         return tuple(sorted({tried.kind for tried in self.open}))
+
+
+def _in_words(tried: Iterable[Tried], best: float) -> str:
+    """In words what is not excluded against log odds of `best`."""
+    return ", or ".join(one.words for one in tried if one.log_odds > best - EXCLUDED)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

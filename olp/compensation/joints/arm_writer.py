@@ -134,7 +134,7 @@ class _Writer:
         if blocks:
             edits += self.dialect.counted(self.program, blocks)
         edits = self.dialect.completed(self.program, edits, self.made)
-        return WrittenJoints(spliced(whole(self.program.data), edits), self.tally, parts)
+        return WrittenJoints(spliced(whole(self.data), edits), self.tally, parts)
 
     # -- arcs ----------------------------------------------------------------------------------------
 
@@ -267,7 +267,7 @@ class _Writer:
         dialect, off = self.dialect, turned_rad / self.dialect.turn_unit_rad
         made = [
             self._written(span, value, dialect.decimals)
-            for span, value in zip(target.numbers, numbers, strict=False)
+            for span, value in zip(target.numbers, numbers[:_PLACE], strict=True)
         ]
         made += [
             self._written(span, value, dialect.turn_decimals, off)
@@ -342,7 +342,7 @@ class _Writer:
         start = target.value[0]
         numbers = [(a - start, b - start, text) for a, b, text in self._edited(target, wanted)]
         name = self._new_name(target)
-        text = spliced(self.program.data[slice(*target.value)], numbers)
+        text = spliced(self.data[slice(*target.value)], numbers)
         edits = [self.dialect.clone(self.program, target, name, text)]
         for row in rows:
             named = self._use(row).named
@@ -371,12 +371,12 @@ class _Writer:
             return b""
         value = float(self.plan.command[row, self.held.column])
         text = self._written(target.along, value, self.dialect.decimals)[2]
-        return b"" if text == self.program.data[slice(*target.along)] else text
+        return b"" if text == self.data[slice(*target.along)] else text
 
     def _new_name(self, target: Target) -> str:
         """A name that the text does not have, made from that of a target."""
         if not self.names:
-            self.names = {word.decode("latin-1").upper() for word in _NAMES.findall(self.program.data)}
+            self.names = {word.decode("latin-1").upper() for word in _NAMES.findall(self.data)}
         name = self.dialect.named(self.program, target, self.names)
         self.names.add(name.upper())
         self.made += 1

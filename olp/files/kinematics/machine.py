@@ -9,7 +9,7 @@ import numpy as np
 from olp.core.errors import ConfigError
 from olp.core.machine import Axis, Machine
 from olp.core.units import AXES
-from olp.files.config import beside, moved_by_change, tools_of, work_offsets_of
+from olp.files.config import beside, in_tenths, moved_by_change, tools_of, work_offsets_of
 from olp.files.kinematics.schema import (
     OWN_DIRECTIONS,
     ROTARY_NAMES,
@@ -109,7 +109,7 @@ def _control(file: JointMachineFile, structure: Structure, path: PathLike) -> Ma
         decimal_point=file.decimal_point,
         tool_change_moves=moved_by_change(file.tool_change_moves),
         still_m_codes=frozenset(file.still_m_codes),
-        still_g_codes=frozenset(round(10 * code) for code in file.still_g_codes),
+        still_g_codes=in_tenths(file.still_g_codes),
         work_offsets=work_offsets_of(file.work_offsets),
         tools=tools_of(file.tools),
         default_tool=file.job_defaults.tool,

@@ -6,14 +6,12 @@ from collections.abc import Iterable
 
 from olp.core.patterns import pattern
 from olp.program.dialect import Support
+from olp.program.robots.urscript.blocks import FUNCTIONS, function_of, nested
 from olp.program.robots.urscript.table import TABLE
 from olp.program.robots.urscript.text import Line
 
 #: One behind a dot is of another machine, which answers.
 _CALLED = pattern(rb"(?<![\w.])[A-Za-z_]\w*(?=[ \t]*\()")
-_FUNCTION = pattern(rb"[ \t]*(def|thread)[ \t]+(\w+)")
-_BEGINS = pattern(rb"[ \t]*(?:def|thread|if|while|for)\b")
-_END = pattern(rb"[ \t]*end\b")
 #: A statement that waits for a thread, or ends it.
 _WAITS = pattern(rb"[ \t]*(?:join|kill)[ \t]+(\w+)")
 #: A thread that begins, and the name by which others wait for it.
@@ -46,22 +44,14 @@ class Calls:
 
     def _survey(self, lines: Iterable[Line]) -> None:
         """Take down what functions call, but not what those do that are defined in them."""
-        open_: list[bytes] = []
-        for line in lines:
-            function = _FUNCTION.match(line.text)
-            if function is not None:
-                open_.append(function[2])
-                self._calls.setdefault(function[2], set())
+        for line, word, blocks in nested(lines):
+            name = function_of(blocks).name
+            own = self._calls.setdefault(name, set()) if name else set()
+            if word in FUNCTIONS:
                 continue
             if (run := _RUN.search(line.text)) is not None:
                 self._threads.setdefault(run[1], set()).add(run[2])
-            if _BEGINS.match(line.text):
-                open_.append(b"")
-            elif _END.match(line.text) and open_:
-                open_.pop()
-            own = next((name for name in reversed(open_) if name), None)
-            if own is not None:
-                self._calls[own] |= _called(line.text)
+            own |= _called(line.text)
 
     def _may(self, name: bytes) -> bool:
         """Whether a function may move the robot."""

@@ -12,15 +12,20 @@ from dataclasses import field
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.robots.targets import Span
+from olp.program.robots.urscript.blocks import (
+    FUNCTION,
+    FUNCTIONS,
+    LOOPS,
+    Block,
+    Branches,
+    function_of,
+    nested,
+)
 from olp.program.robots.urscript.text import Line
 
 ASSIGNED = pattern(rb"\s*(?:(global|local)\s+)?([A-Za-z_]\w*)\s*=(?!=)\s*(.*?)\s*")
 ELEMENT = pattern(rb"\s*(?:(global|local)\s+)?([A-Za-z_]\w*)\s*\[[^\]]*\]\s*=(?!=)")
-_BEGINS = pattern(rb"\s*(def|thread|if|while|for|elif|else|end)\b")
-_FUNCTION = pattern(rb"\s*(?:def|thread)\s+(\w+)\s*\((.*)\)")
 _PARAMETER = pattern(rb"\s*([A-Za-z_]\w*)")
-_FUNCTIONS = (b"def", b"thread")
-_LOOPS = (b"while", b"for")
 
 #: A name as one function or all of them know it: the line of the function that it is local to, else 0.
 _Variable = tuple[int, bytes]
@@ -49,18 +54,6 @@ class _Given:
         return functions.pop() if len(functions) == 1 else -1
 
 
-@dataclass(slots=True)
-class _Open:
-    """An open block: its `word`, the line where it begins, what held there, and at the ends of branches.
-    `whole`: one of these runs in any case."""
-
-    word: bytes
-    line: int
-    begun: dict[_Variable, Named | None]
-    ends: list[dict[_Variable, Named | None]] = field(default_factory=list)
-    whole: bool = False
-
-
 class Names:
     """Poses and joint values by their names while a text is read. `states` says whether a value has numbers,
     `recursive` whether a function may call itself."""
@@ -77,7 +70,7 @@ class Names:
         self._states = states
         self._survey(lines, recursive)
         self._now: dict[_Variable, Named | None] = {}
-        self._functions, self._open = [0], list[_Open]()
+        self._functions, self._branches = [0], Branches[dict[_Variable, Named | None]]()
 
     @property
     def lines(self) -> Iterator[int]:
@@ -87,25 +80,20 @@ class Names:
         )
 
     def _survey(self, lines: Iterable[Line], recursive: Callable[[bytes], bool]) -> None:
-        functions, open_, given = [0], list[tuple[bytes, int]](), list[tuple[Line, int, list[int]]]()
-        for line in lines:
-            begins, function = _BEGINS.match(line.text), _FUNCTION.match(line.text)
-            word = b"" if begins is None else begins[1]
-            if word in (*_FUNCTIONS, *_LOOPS, b"if"):
-                open_.append((word, line.line))
-            if word in _FUNCTIONS:
-                functions.append(line.line)
-                self._hidden[line.line] = set() if function is None else _parameters(function[2])
-                self._again[line.line] = function is None or recursive(function[1])
-            elif word == b"end" and open_ and open_.pop()[0] in _FUNCTIONS:
-                functions.pop()
+        given: list[tuple[Line, int, list[int]]] = []
+        for line, word, blocks in nested(lines):
+            own, function = function_of(blocks), FUNCTION.match(line.text)
+            if word in FUNCTIONS:
+                stated = None if function is None else function[2]
+                self._hidden[line.line] = set() if stated is None else _parameters(stated)
+                self._again[line.line] = stated is None or recursive(own.name)
             found = ELEMENT.match(line.text) or ASSIGNED.fullmatch(line.text)
-            if begins is None and found is not None:
-                given.append((line, functions[-1], [begin for _, begin in open_]))
+            if not word and found is not None:
+                given.append((line, own.line, [block.line for block in blocks]))
                 if found[1] == b"local":
-                    self._local.add((functions[-1], found[2]))
-        for line, own, blocks in given:
-            self._take(line, own, blocks)
+                    self._local.add((own.line, found[2]))
+        for line, begun, inside in given:
+            self._take(line, begun, inside)
 
     def _take(self, line: Line, function: int, open_: list[int]) -> None:
         """Keep a value that a statement gives to a name."""
@@ -153,26 +141,24 @@ class Names:
     def block(self, line: Line, word: bytes) -> None:
         """A block begins, parts or ends."""
         if word in (b"elif", b"else"):
-            if self._open:
-                begun = self._open[-1]
-                begun.ends.append(self._now)
-                begun.whole |= word == b"else"
-                self._now = dict(begun.begun)
+            self._now = dict(self._branches.part(word, self._now))
         elif word == b"end":
-            if self._open:
-                self._close(self._open.pop())
+            self._close()
         else:
-            if word in _LOOPS:
+            if word in LOOPS:
                 self._now |= dict.fromkeys(self._inside.get(line.line, ()))
-            self._open.append(_Open(word, line.line, dict(self._now)))
-            if word in _FUNCTIONS:
+            self._branches.begin(Block(word, line.line), dict(self._now))
+            if word in FUNCTIONS:
                 self._functions.append(line.line)
 
-    def _close(self, block: _Open) -> None:
-        if block.word in _FUNCTIONS:
+    def _close(self) -> None:
+        done = self._branches.end(self._now)
+        if done is None:
+            return
+        block, _, ends = done
+        if block.word in FUNCTIONS:
             self._functions.pop()
             return
-        ends = [*block.ends, self._now, *(() if block.whole else (block.begun,))]
         for variable in self._inside.get(block.line, ()):
             held = [end.get(variable) for end in ends]
             self._now[variable] = held[0] if all(one is held[0] for one in held) else None

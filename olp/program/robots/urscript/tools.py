@@ -13,14 +13,19 @@ from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.robots.frames import Tool
 from olp.program.robots.poses import Pose
+from olp.program.robots.urscript.blocks import (
+    FUNCTION,
+    FUNCTIONS,
+    LOOPS,
+    Block,
+    Branches,
+    function_of,
+    nested,
+)
 from olp.program.robots.urscript.text import Line
 
 _WORD = pattern(rb"[A-Za-z_]\w*")
-_BEGINS = pattern(rb"\s*(def|thread|if|while|for|elif|else|end)\b")
-_FUNCTION = pattern(rb"\s*(?:def|thread)\s+(\w+)")
 _SET = pattern(rb"\s*set_tcp\s*\((.*)\)\s*")
-_FUNCTIONS = (b"def", b"thread")
-_LOOPS = (b"while", b"for")
 
 
 @dataclass(slots=True)
@@ -31,18 +36,6 @@ class _Function:
     tools: list[Pose | None] = field(default_factory=list)
     calls: set[bytes] = field(default_factory=set)
     callers: list[tuple[bytes, bool]] = field(default_factory=list)
-
-
-@dataclass(slots=True)
-class _Open:
-    """An open block: its `word`, the tool at its begin with why that is not known, and those at the ends of
-    its branches. `whole`: one of them runs in any case."""
-
-    word: bytes
-    tool: Tool | None
-    why: str
-    ends: list[Tool | None] = field(default_factory=list)
-    whole: bool = False
 
 
 class Tools:
@@ -57,39 +50,30 @@ class Tools:
         self._survey(list(lines))
         self.tool: Tool | None = None
         self.why = ""
-        self._open: list[_Open] = []
+        #: the tool, and why that is not known
+        self._branches = Branches[tuple[Tool | None, str]]()
 
     def _survey(self, lines: list[Line]) -> None:
         """Take down what functions set and call, and what is set in blocks."""
-        defined = {match[1] for line in lines if (match := _FUNCTION.match(line.text)) is not None}
+        defined = {match[1] for line in lines if (match := FUNCTION.match(line.text)) is not None}
         self._functions.update((name, _Function()) for name in defined)
-        names: list[bytes] = [b""]
-        open_: list[tuple[bytes, int]] = []
         at_top: set[bytes] = set()
         self.last = 0
-        for line in lines:
-            begins, given = _BEGINS.match(line.text), _SET.fullmatch(line.text)
-            word = b"" if begins is None else begins[1]
-            function = _FUNCTION.match(line.text)
-            if function is not None:
-                names.append(function[1])
-            elif word == b"end" and open_ and open_.pop()[0] in _FUNCTIONS:
-                names.pop()
-            if word in (*_FUNCTIONS, b"if", *_LOOPS):
-                open_.append((word, line.line))
-            if function is not None:
+        for line, word, blocks in nested(lines):
+            if word in FUNCTIONS:
                 continue
-            own = self._functions[names[-1]]
+            given, caller = _SET.fullmatch(line.text), function_of(blocks).name
+            own = self._functions[caller]
             if given is not None:
                 pose, self.last = self._pose_of(given[1]), line.line
                 own.tools.append(pose)
-                for _, begin in open_:
-                    self._sets.setdefault(begin, []).append((line.line, pose))
-                if not open_ or open_[-1][0] in _FUNCTIONS:
-                    at_top.add(names[-1])
+                for block in blocks:
+                    self._sets.setdefault(block.line, []).append((line.line, pose))
+                if not blocks or blocks[-1].word in FUNCTIONS:
+                    at_top.add(caller)
             for name in defined.intersection(_WORD.findall(line.text)):
                 own.calls.add(name)
-                self._functions[name].callers.append((names[-1], names[-1] in at_top))
+                self._functions[name].callers.append((caller, caller in at_top))
         stated = [pose for function in self._functions.values() for pose in function.tools]
         first = stated[0] if stated else None
         if first is not None and all(pose is not None and pose.same(first) for pose in stated):
@@ -133,37 +117,33 @@ class Tools:
     def block(self, line: Line, word: bytes) -> None:
         """A block begins, parts or ends."""
         if word in (b"elif", b"else"):
-            if self._open:
-                begun = self._open[-1]
-                begun.ends.append(self.tool)
-                begun.whole |= word == b"else"
-                self.tool, self.why = begun.tool, begun.why
+            self.tool, self.why = self._branches.part(word, (self.tool, self.why))
         elif word == b"end":
-            if self._open:
-                self._close(self._open.pop(), line)
+            self._close(line)
         else:
-            self._open.append(_Open(word, self.tool, self.why))
-            if word in _FUNCTIONS:
-                self._enter(line)
-            elif word in _LOOPS:
+            if word in LOOPS:
                 poses = [pose for _, pose in self._sets.get(line.line, ())]
                 self._may_be(poses, f"the loop of line {line.line} sets another tool")
-                self._open[-1].tool, self._open[-1].why = self.tool, self.why
+            self._branches.begin(Block(word, line.line), (self.tool, self.why))
+            if word in FUNCTIONS:
+                self._enter(line)
 
     def _enter(self, line: Line) -> None:
-        function = _FUNCTION.match(line.text)
+        function = FUNCTION.match(line.text)
         name = b"" if function is None else function[1]
         self.tool = self.only if name in self._functions and self._covered(name) else None
         self.why = ""
         if self.tool is None and self.last:
             self.why = f"whether set_tcp in line {self.last} ran before depends on the run"
 
-    def _close(self, block: _Open, line: Line) -> None:
-        if block.word in _FUNCTIONS:
-            self.tool, self.why = block.tool, block.why
+    def _close(self, line: Line) -> None:
+        done = self._branches.end((self.tool, self.why))
+        if done is None:
             return
-        ends = [*block.ends, self.tool, *(() if block.whole else (block.tool,))]
-        if any(not _same(end, ends[0]) for end in ends):
+        block, begun, ends = done
+        if block.word in FUNCTIONS:
+            self.tool, self.why = begun
+        elif any(not _same(tool, ends[0][0]) for tool, _ in ends):
             self.tool, self.why = None, f"the block up to line {line.line} sets another tool"
 
 
