@@ -149,6 +149,8 @@ MOVE = "movel(p[0.1,0.2,-0.3,0,0,0])\n"
         # in branches and loops
         (f"def a():\n{SET}if x:\n{SET}end\n{MOVE}end\n", "1"),
         (f"def a():\n{SET}if x:\nset_tcp(p[0,0,0.2,0,0,0])\n{MOVE}else:\n{MOVE}end\n{MOVE}end\n", "110"),
+        (f"def a():\nset_tcp(p[0,0,0.2,0,0,0])\nif x:\n{SET}else:\n{SET}end\n{MOVE}end\n", "1"),
+        (f"def a():\nset_tcp(p[0,0,0.2,0,0,0])\n{MOVE}if x:\n{SET}elif y:\n{SET}end\n{MOVE}end\n", "10"),
         (f"def a():\n{SET}while x:\n{MOVE}set_tcp(p[0,0,0.2,0,0,0])\n{MOVE}end\n{MOVE}end\n", "010"),
         # moves that no target states, and a value that is none
         (f"def a():\n{SET}q=get_inverse_kin(p[0,0,0,0,0,0])\nservoj(q)\nforce_mode(q)\n{MOVE}end\n", "1"),
