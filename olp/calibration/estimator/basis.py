@@ -85,8 +85,11 @@ class Scales:
 #: Powers of the frequency with which the variances of the processes fall, and the half waves over the axis
 #: where they end.
 SPECTRA = (
-    (6.0, np.inf), (4.0, np.inf), (2.0, np.inf), (0.0, np.inf), (3.0, 2.5), (3.0, 4.0), (3.0, 6.5)
+    (6.0, np.inf), (4.0, np.inf), (2.0, np.inf), (0.0, np.inf), (2.0, 2.5), (2.0, 4.0), (2.5, 5.5)
 )  # fmt: skip
+#: Power of the frequency in the exponent that ends swings. With a soft end (2) long swings beside ripple
+#: explain what shorter swings alone do.
+_END = 6.0
 #: Swings are those of an axis so many times as long, of which the curve is the middle: its ends are no ends.
 LONGER = 3
 #: Row of ripple in a spectrum.
@@ -167,7 +170,7 @@ def _processes(cells: int) -> Array:
         frequency = (values[STRAIGHT:] * cells**4) ** 0.25
         # of a process of length 1: white noise has a variance that does not depend on the cells
         variance = frequency**-power * (cells if power else 1.0)
-        variance *= np.exp(-((frequency / (np.pi * waves)) ** 2))
+        variance *= np.exp(-((frequency / (np.pi * waves)) ** _END))
         first = (times - 1) // 2 * cells
         middle = vectors[first : first + cells + 3, STRAIGHT:]
         parts.append((middle * variance) @ middle.T)

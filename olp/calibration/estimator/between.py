@@ -2,12 +2,15 @@
 
 The same processes on a spline of many more cells, known at the same targets, leave more open between them.
 The difference of both variances is what the cells hide. Waves of a screw are shorter than any of these cells:
-ripple that readings show at targets is another one right beside them, and targets do not tell it.
+such ripple at targets is another one right beside them, and targets do not tell it. Other ripple is as wide
+as cells, which hold it: dents, and values of a table.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +22,8 @@ from olp.core.values import dataclass
 
 #: Cells between two targets that resolve what happens there.
 _RESOLVED = 6
+#: Share of the variance of ripple that waves shorter than cells have.
+_SHORT = 0.75
 #: Cells of the fine spline, at least and at most.
 _FINE = 72, 240
 #: Positions between two targets where the variance is taken.
@@ -49,6 +54,7 @@ def hidden(
     ends = np.array([spline.low_mm, spline.high_mm])
     q = np.union1d((targets[:-1, None] + inside).ravel(), np.append(targets[-1:], ends))
     straight = lines[0][0].quantity == "straightness"
+    scales = replace(scales, ripple=math.sqrt(_SHORT) * scales.ripple)
     read = _Read(targets, variance, datum_mm, straight)
     left, held = (_left(one, scales, amplitude, q, read, apart=one is fine) for one in (fine, spline))
     return Hidden(q, np.maximum(left - held, 0.0))

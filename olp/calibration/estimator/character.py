@@ -23,7 +23,7 @@ from olp.core.arrays import Array
 #: Processes that make the smooth part of a curve, as rows of a spectrum: one of them, and no other.
 SMOOTH = (0, 1, 4, 5, 6)
 #: How probable each is before any reading, up to a factor: few targets do not tell them apart.
-SMOOTH_BEFORE = 0.3, 1.0, 0.5, 1.0, 4.0
+SMOOTH_BEFORE = 0.3, 0.5, 1.0, 3.0, 3.0
 #: Candidates for the smooth part of positioning, root mean square over the axis in mm, as all candidates.
 SIZES = np.geomspace(2e-3, 0.512, 9)
 #: Candidates for steps.
@@ -42,7 +42,7 @@ RELATED = 0.0, 1.0, 0.5, 0.5
 #: logarithm of that.
 STEPS_BEFORE = 0.9, 1.2e-3, 0.7
 #: The same of ripple.
-RIPPLE_BEFORE = 0.02, 3.2e-3, 0.5
+RIPPLE_BEFORE = 0.15, 3.0e-3, 0.3
 #: The scale that stands for all probable ones is the mean of this power of them: 2 is the expected variance.
 MOMENT = 2.0
 #: Directions of the unknowns that readings determine less than this, against the best, say nothing.
