@@ -14,6 +14,7 @@ from olp.core.machine import Machine, Setup
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.calibration import Calibration
+from olp.errormodel.uncertainty import Uncertainty
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 
@@ -21,14 +22,15 @@ from olp.program.program import Program
 @dataclass(frozen=True, slots=True, eq=False)
 class Inputs:
     """What a run is given: machine and job, the program as read, and the day of the run. Calibration and
-    model are None for a run without them. Where the call states the errors in place of files, `assumed` is
-    what it assumes, and `by_height` whether they depend on Z."""
+    model are None for a run without them, and `uncertainty` where none is stated. Where the call states the
+    errors in place of files, `assumed` is what it assumes, and `by_height` whether they depend on Z."""
 
     setup: Setup
     program: Program
     calibration: Calibration | None
     model: ErrorModel | None
     date: datetime.date | None
+    uncertainty: Uncertainty | None
     assumed: tuple[str, ...] = ()
     by_height: bool = False
 
@@ -42,17 +44,20 @@ def doubts(inputs: Inputs) -> tuple[Finding, ...]:
 
         assert inputs.calibration is not None
         findings += assumption_findings(path, inputs.assumed, by_height=inputs.by_height)
-        findings += calibration_doubts(inputs.calibration, setup.machine, None, made=False)
+        findings += calibration_doubts(inputs.calibration, setup.machine, None, None, made=False)
     elif inputs.calibration is not None:
-        findings += stated_doubts(inputs.calibration, setup.machine, inputs.date)
+        findings += stated_doubts(inputs.calibration, setup.machine, inputs.date, inputs.uncertainty)
     if inputs.calibration is not None and inputs.model is not None:
         findings += size_doubts(path, inputs.model, inputs.calibration, setup.machine)
     return tuple(findings)
 
 
-def stated_doubts(calibration: Calibration, machine: Machine, date: datetime.date | None) -> list[Finding]:
+def stated_doubts(
+    calibration: Calibration, machine: Machine, date: datetime.date | None, uncertainty: Uncertainty | None
+) -> list[Finding]:
     """Doubts about what a calibration states, on the day of the run."""
     days = machine.sanity.calibration_days
     return [
-        *calibration_findings(calibration, date, days), *calibration_doubts(calibration, machine, date),
-    ]  # fmt: skip
+        *calibration_findings(calibration, date, days),
+        *calibration_doubts(calibration, machine, date, uncertainty),
+    ]

@@ -13,6 +13,7 @@ from olp.core.arrays import Array
 from olp.core.machine import Machine
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.errormodel.calibration import PLACEHOLDER_DATE, Calibration
+from olp.errormodel.uncertainty import Uncertainty
 from olp.findings.catalogue import Finding
 
 #: rad; squareness of a machine that a person aligned with a try square. 667 urad of a hobby router pass.
@@ -62,7 +63,12 @@ _WORKPIECE_PER_K = (0.03e-6, 300e-6)
 
 
 def calibration_doubts(
-    calibration: Calibration, machine: Machine, date: datetime.date | None, *, made: bool = True
+    calibration: Calibration,
+    machine: Machine,
+    date: datetime.date | None,
+    uncertainty: Uncertainty | None,
+    *,
+    made: bool = True,
 ) -> Iterator[Finding]:
     """All doubts that a calibration and its machine raise, without a program; what only one that is `made`
     from readings states is not missed in others."""
@@ -74,7 +80,7 @@ def calibration_doubts(
     yield from _backlash(calibration, machine)
     yield from _cyclic(calibration, machine)
     yield from _columns(calibration)
-    yield from unit_doubts(calibration)
+    yield from unit_doubts(calibration, uncertainty)
     yield from _box(calibration, machine)
     yield from _places(calibration, machine)
     yield from _expansion(calibration)

@@ -10,18 +10,20 @@ from olp.checks.base import finding
 from olp.core.arrays import Array, median
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.errormodel.calibration import Calibration, Curve
+from olp.errormodel.uncertainty import Uncertainty
 from olp.findings.catalogue import Finding
 
 #: Columns in another unit are smaller than the others by so much: 1000 less a span of values, ...
 _OTHER_UNIT = 300.0
-#: ... and by no more than this: smaller ones are what an adjustment leaves of nothing.
-_MOST_OTHER_UNIT = 10_000.0
+#: ... and by no more than this: inches are 25,400 times smaller. What is smaller is left of nothing.
+_MOST_OTHER_UNIT = 100_000.0
 #: mm; a column of lengths in another unit has no value above this.
 _TINY_MM = 0.5e-3
 #: rad; a column of angles in another unit has no value above this.
 _TINY_RAD = 0.5e-6
-#: mm or mrad; in the calibration of a fit, a column without a larger value is what nothing was observed of.
-_UNOBSERVED = 1e-5
+#: A column and its own sigma column may be in units that differ by so much: inches and micrometres. An
+#: adjustment has one unit.
+_UNITS_APART = 25_400.0
 #: Columns beside one, without which none is the odd one.
 _OTHERS = 3
 #: rad; angles of all axes, or all squareness, in mrad or degrees. Autocollimators resolve 0.05 urad.
@@ -46,15 +48,18 @@ _KINDS = (("XYZ", "errors", _TINY_MM), ("ABC", "angles", _TINY_RAD))
 _EXPECTED = "expected columns in um and urad"
 
 
-def unit_doubts(calibration: Calibration) -> Iterator[Finding]:
-    """All doubts about columns of curves, squareness and maps."""
+def unit_doubts(calibration: Calibration, uncertainty: Uncertainty | None) -> Iterator[Finding]:
+    """All doubts about columns of curves, squareness and maps. What `uncertainty` says that no reading shows
+    is small for that reason, and in no other unit."""
+    sizes = {letters: _shown(_sizes(calibration, letters), "mean", uncertainty) for letters, *_ in _KINDS}
     for letters, what, tiny in _KINDS:
-        sizes = _sizes(calibration, letters)
-        least = _UNOBSERVED * tiny / _TINY_MM if calibration.quality else 0.0
-        axes = list(_axes_of_other_unit(sizes, what, tiny))
-        yield from axes or _columns_of_other_unit(sizes, tiny, least)
-    yield from _no_angles(calibration)
-    yield from _squareness(calibration)
+        axes = list(_axes_of_other_unit(sizes[letters], what, tiny))
+        yield from axes or _columns_of_other_unit(sizes[letters], tiny)
+    angle, length = (max(sizes[letters].values(), default=0.0) for letters in ("ABC", "XYZ"))
+    nothing_mm = _SHARE_OF_LENGTHS * length
+    yield from _no_angles(calibration, angle, nothing_mm)
+    square = {name: abs(value) for name, value in calibration.squareness.items() if value}
+    yield from _squareness(calibration, _shown(square, "squareness", uncertainty), nothing_mm)
     yield from _maps(calibration)
     yield from _offsets(calibration)
 
@@ -83,6 +88,16 @@ def _sizes(calibration: Calibration, letters: str) -> dict[str, float]:
     return {name: size for name, size in sizes.items() if size}
 
 
+def _shown(sizes: Mapping[str, float], kind: str, uncertainty: Uncertainty | None) -> dict[str, float]:
+    """Those that are more than their standard uncertainty at half of their positions, or have none. A sigma
+    column hides only what it would hide in a larger unit, too."""
+    if uncertainty is None:
+        return dict(sizes)
+    factor = 1.0 if uncertainty.rank else _UNITS_APART
+    known = {entry.name: median(entry.sigma) for entry in uncertainty.entries if entry.kind == kind}
+    return {name: size for name, size in sizes.items() if factor * size > known.get(name, 0.0)}
+
+
 def _axes_of_other_unit(sizes: Mapping[str, float], what: str, tiny: float) -> Iterator[Finding]:
     """Columns of one axis that are a thousand times smaller than those of both other axes."""
     largest = {axis: max((v for n, v in sizes.items() if n[2] == axis), default=0.0) for axis in AXES}
@@ -93,11 +108,11 @@ def _axes_of_other_unit(sizes: Mapping[str, float], what: str, tiny: float) -> I
             yield finding("OLP450", f"{text}of the other axes; {_EXPECTED}")
 
 
-def _columns_of_other_unit(sizes: Mapping[str, float], tiny: float, least: float) -> Iterator[Finding]:
-    """One column that is a thousand times smaller than most others, if it is not below `least`."""
+def _columns_of_other_unit(sizes: Mapping[str, float], tiny: float) -> Iterator[Finding]:
+    """One column that is a thousand times smaller than most others."""
     for name, size in sizes.items():
         others = [value for other, value in sizes.items() if other != name]
-        if not least <= size < tiny or len(others) < _OTHERS:
+        if size >= tiny or len(others) < _OTHERS:
             continue
         ratio = median(np.array(others)) / size
         if _OTHER_UNIT < ratio < _MOST_OTHER_UNIT:
@@ -105,24 +120,22 @@ def _columns_of_other_unit(sizes: Mapping[str, float], tiny: float, least: float
             yield finding("OLP450", f"{text}; {_EXPECTED}")
 
 
-def _no_angles(calibration: Calibration) -> Iterator[Finding]:
-    angle = max(_sizes(calibration, "ABC").values(), default=0.0)
-    if _vanishing(angle, calibration):
+def _no_angles(calibration: Calibration, angle: float, nothing_mm: float) -> Iterator[Finding]:
+    if _vanishing(angle, calibration, nothing_mm):
         text = f"calibration: the angles of all axes are at most {angle / RAD_PER_URAD:.2g} urad"
         yield finding("OLP450", f"{text}, which is nothing beside its other errors; {_EXPECTED}")
 
 
-def _squareness(calibration: Calibration) -> Iterator[Finding]:
-    angles = [abs(angle) for angle in calibration.squareness.values() if angle]
-    if len(angles) > 1 and _vanishing(max(angles), calibration):
-        text = f"calibration: every squareness is at most {max(angles) / RAD_PER_URAD:.2g} urad"
+def _squareness(calibration: Calibration, sizes: Mapping[str, float], nothing_mm: float) -> Iterator[Finding]:
+    largest = max(sizes.values(), default=0.0)
+    if len(sizes) > 1 and _vanishing(largest, calibration, nothing_mm):
+        text = f"calibration: every squareness is at most {largest / RAD_PER_URAD:.2g} urad"
         yield finding("OLP450", f"{text}; expected angles in urad that can be measured")
 
 
-def _vanishing(angle: float, calibration: Calibration) -> bool:
+def _vanishing(angle: float, calibration: Calibration, nothing_mm: float) -> bool:
     """Whether an angle is stated and does nothing on this machine."""
-    length = max(_sizes(calibration, "XYZ").values(), default=0.0)
-    return _NOTHING_RAD < angle < _NO_ANGLE_RAD and angle * _span_mm(calibration) < _SHARE_OF_LENGTHS * length
+    return _NOTHING_RAD < angle < _NO_ANGLE_RAD and angle * _span_mm(calibration) < nothing_mm
 
 
 def _span_mm(calibration: Calibration) -> float:

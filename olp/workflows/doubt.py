@@ -42,7 +42,7 @@ def doubted(
     program = program.in_original()
     stated = loaded.stated
     inputs = Inputs(
-        loaded.setup, program, loaded.calibration, loaded.model, date,
+        loaded.setup, program, loaded.calibration, loaded.model, date, loaded.uncertainty,
         assumed=stated.assumed if stated else (), by_height=stated is not None and stated.by_height,
     )  # fmt: skip
     accepted = acceptable(accept) | accepted_in(stamped, loaded.digest)
@@ -57,7 +57,7 @@ def doubted_motion(
     if _calibrated(session):
         return doubted(program, session.loaded("hold"), accept, date, name=name, stamped=program.data)
     accepted = acceptable(accept) | accepted_in(program.data, None)
-    inputs = Inputs(session.setup, program.in_original(), None, None, date)
+    inputs = Inputs(session.setup, program.in_original(), None, None, date, None)
     return with_accepted(doubts(inputs), accepted, name=name, origin=program.origin)
 
 

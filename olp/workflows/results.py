@@ -198,7 +198,7 @@ def _doubts(loaded: Loaded, result: Forward, options: ResultOptions) -> tuple[Fi
     """Doubts about the calibration, with the styli of the results. Raises Doubtful."""
     machine, tools = loaded.setup.machine, np.atleast_2d(result.tool_vector_mm)
     findings = [
-        *stated_doubts(loaded.calibration, machine, options.date),
+        *stated_doubts(loaded.calibration, machine, options.date, loaded.uncertainty),
         *box_doubts(loaded.held().model, tools, loaded.calibration, machine),
     ]
     return with_accepted(findings, acceptable(options.accept))

@@ -106,8 +106,9 @@ RULES = (
         "OLP450",
         "errors of one axis in another unit",
         Severity.ERROR,
-        "The errors of one axis are hundreds of times smaller than those of both other axes. Millimetres "
-        "in a column of micrometres do that.",
+        "The errors of one axis are hundreds of times smaller than those of both other axes, or one column "
+        "than most others. Millimetres in a column of micrometres do that. Values within their own "
+        "uncertainty in the covariance of a fit raise no doubt: no reading shows them.",
         "Check the unit of these values: lengths are in um, angles in urad.",
         "0.012 in the column EXX_um, and 9.7 in EYY_um.",
     ),
