@@ -97,3 +97,11 @@ def test_an_axis_that_the_program_leaves_turns_round_for_its_correction_alone(tm
     assert result.report["deviation"]["before"]["position_max_um"] > 5.0
     z_mm = [float(word) for word in re.findall(rb"Z(-?[\d.]+)", result.data)]
     assert z_mm == pytest.approx([-5.0, 0.006, -0.006, -0.011, -0.016, -0.004, 0.001, 0.006])
+
+
+def test_a_simulation_takes_the_backlash_up(tmp_path: Path) -> None:
+    """Its load follows 20 um behind the drive after each turn: half of that off to either side."""
+    machine = machine_file(tmp_path, "C F X Y Z B", errors=False, calibration=PLAY)
+    done = olp.simulate_joints(listed(-10.0, 0.0, 10.0, 0.0), machine, step_mm=5.0)
+    off_um = 1e3 * (done.points_mm[:, 0] - done.axes[:, 0])
+    assert off_um == pytest.approx([-10.0] * 4 + [10.0] * 2, abs=1e-6)

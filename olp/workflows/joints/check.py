@@ -10,9 +10,8 @@ from typing import Any
 
 from olp.checks.base import finding
 from olp.checks.stamps import stamp_findings
-from olp.compensation.stamp import find_stamp, line_of
-from olp.core.errors import AlreadyCorrected, ProgramError
-from olp.core.spool import Text
+from olp.compensation.stamp import find_stamp
+from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 from olp.files.sources import Source
 from olp.findings.catalogue import Finding
@@ -20,16 +19,18 @@ from olp.findings.choice import chosen
 from olp.findings.rule import Severity
 from olp.reports.joints import verdict_of
 from olp.workflows import refusals
+from olp.workflows.joints.alone import alone
 from olp.workflows.joints.correct import JointOptions, ProvedJoints, correction_of
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.verify import verification_of
+from olp.workflows.original import placed_findings
 from olp.workflows.session import Outside, PathLike
 from olp.workflows.shown import Shown
 
 #: What is looked for on such a machine, in the order of codes.
 CODES = (
     "OLP101", "OLP102", "OLP103", "OLP105", "OLP106", "OLP107", "OLP111", "OLP311", "OLP312", "OLP331",
-    "OLP332", "OLP401", "OLP403", "OLP405", "OLP408", "OLP422",
+    "OLP332", "OLP401", "OLP402", "OLP403", "OLP405", "OLP408", "OLP422",
 )  # fmt: skip
 
 
@@ -44,7 +45,8 @@ class JointCheckOptions(JointOptions):
 @dataclass(frozen=True, slots=True, eq=False)
 class JointCheck(Shown):
     """The findings of a gate and its report ("olp-check-1"), with the proof ("olp-joints-1") as its part
-    `proof`. `refused` is the error of a program that is refused; the findings are its reasons then."""
+    `proof` where a nominal program is known. `refused` is the error of a program that is refused; the
+    findings are its reasons then."""
 
     findings: tuple[Finding, ...]
     report: dict[str, Any]
@@ -73,8 +75,9 @@ def check_joints(
     ignore: Sequence[str] = (),
 ) -> JointCheck:
     """May this program run on this machine with rotary joints? As `check`, with the options of
-    `correct_joints`: without `nominal` the program is corrected in memory, else it is proved against that
-    one. Raises as `correct_joints`, and UsageError for codes that are not looked for."""
+    `correct_joints`: with `nominal` the program is proved against that one. A corrected program alone is
+    checked unchanged, without what needs the nominal one; any other is corrected in memory. Raises as
+    `correct_joints`, and UsageError for codes that are not looked for."""
     options = JointCheckOptions(
         tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, outside_box=outside_box, flatten=flatten,
         expand_cycles=expand_cycles, date=date, select=tuple(select), ignore=tuple(ignore),
@@ -87,47 +90,68 @@ def check_joints(
 
 
 def examined(run: JointRun, corrected: Source | None, options: JointCheckOptions) -> JointCheck:
-    """May a program run? Without `corrected` the program of `run` is corrected in memory, else that of `run`
-    is the nominal one. Lines are those of the program that is checked. A program that is refused gives its
-    reasons as findings, and the error. Raises UsageError for codes that are not looked for, and as
-    `correct_joints`."""
+    """May a program run? With `corrected` the program of `run` is the nominal one. Without it that of `run`
+    is corrected in memory, or checked unchanged where it is corrected already. Lines are those of the program
+    that is checked. A program that is refused gives its reasons as findings, and the error. Raises UsageError
+    for codes that are not looked for, and as `correct_joints`."""
     codes = chosen(options.select, options.ignore, CODES)
     program = run.program if corrected is None else corrected
     program.load()
     # a command outside is a finding, not the end
     hold = replace(options, outside_box="hold")
     try:
-        if corrected is None:
-            _refuse_stamped(program)
-            done, what = correction_of(run, hold), "the result of olp correct on the program"
-        else:
-            done = verification_of(run, corrected, hold)
-            what = f"the corrected program against the nominal one ({run.program.short or 'stdin'})"
+        checked = _checked(run, corrected, hold)
     except ProgramError as error:
         return _refused(error, run, program, options)
-    findings = _findings(done, run, None if corrected is None else corrected.data, options)
+    findings = list(checked.findings)
+    if options.date is None and run.calibration is not None:
+        findings.append(finding("OLP408", "no date is given"))
+    if options.outside_box == "refuse":
+        findings = [replace(one, code="OLP405") if one.code == "OLP403" else one for one in findings]
     kept = tuple(sorted((f for f in findings if f.code in codes), key=lambda f: (f.code, f.line or 0)))
     report = {
         **_head(run, program, options),
-        "checked": what,
+        "checked": checked.what,
         "accepted": [],
         "rules": codes,
-        "verdict": _verdict(done, kept, codes),
+        "verdict": None if checked.done is None else _verdict(checked.done, kept, codes),
         "findings": [f.as_dict() for f in kept],
-        "proof": {name: part for name, part in done.report.items() if name not in ("findings", "verdict")},
     }
+    if checked.done is not None:
+        proof = checked.done.report
+        report["proof"] = {name: proof[name] for name in proof if name not in ("findings", "verdict")}
     return JointCheck(kept, report)
 
 
-def _refuse_stamped(program: Source) -> None:
-    stamp = find_stamp(program.data)
-    if stamp is not None:
-        raise AlreadyCorrected(
-            "the program is corrected already; name its nominal program with --nominal, and it is proved "
-            "against that one",
-            line=line_of(program.data, stamp),
-            code="OLP560",
-        )
+@dataclass(frozen=True, slots=True, eq=False)
+class _Checked:
+    """What was checked in words, the findings at lines of the program that is checked, and the proof, None
+    where no nominal program is known."""
+
+    what: str
+    findings: Sequence[Finding]
+    done: ProvedJoints | None = None
+
+
+def _checked(run: JointRun, corrected: Source | None, options: JointOptions) -> _Checked:
+    """A corrected program is proved against that of `run`; a program alone with a stamp is checked unchanged,
+    others are corrected here. Raises ProgramError."""
+    if corrected is not None:
+        done = verification_of(run, corrected, options)
+        what = f"the corrected program against the nominal one ({run.program.short or 'stdin'})"
+        found = [_in_corrected(one, done) for one in done.findings]
+        return _Checked(what, [*found, *stamp_findings(corrected.data, run.program.data, run.digest)], done)
+    data = run.program.data
+    if find_stamp(data) is None:
+        done = correction_of(run, options)
+        return _Checked("the result of olp correct on the program", done.findings, done)
+    with run.program.errors():
+        path = run.read(run.program, options)[1]
+        found = alone(run, path, options.date)
+    what = "the corrected program; checks that need the nominal one are left out (give --nominal)"
+    return _Checked(
+        what, [*placed_findings(found, path.program.origin), *stamp_findings(data, None, run.digest)]
+    )
 
 
 def _refused(error: ProgramError, run: JointRun, program: Source, options: JointCheckOptions) -> JointCheck:
@@ -145,21 +169,6 @@ def _refused(error: ProgramError, run: JointRun, program: Source, options: Joint
         **refusals.parts_of(error, name),
     }
     return JointCheck(refusals.findings_of(error, name), report, error)
-
-
-def _findings(
-    done: ProvedJoints, run: JointRun, corrected: Text | None, options: JointCheckOptions
-) -> list[Finding]:
-    """All findings, at lines of the program that is checked: those of the proof, and those of the gate."""
-    found = list(done.findings)
-    if corrected is not None:
-        found = [_in_corrected(one, done) for one in found]
-        found += stamp_findings(corrected, run.program.data, run.digest)
-    if options.outside_box == "refuse":
-        found = [replace(one, code="OLP405") if one.code == "OLP403" else one for one in found]
-    if options.date is None and run.calibration is not None:
-        found.append(finding("OLP408", "no date is given"))
-    return found
 
 
 def _in_corrected(one: Finding, done: ProvedJoints) -> Finding:

@@ -9,7 +9,6 @@ import numpy as np
 
 from olp.comparison.path import Path
 from olp.compensation.joints.path import JointPath
-from olp.compensation.joints.sampling import spread
 from olp.core.arrays import Array, Index
 from olp.core.errors import InputError, UsageError
 from olp.files.point_profile import PointProfile
@@ -21,6 +20,7 @@ from olp.program.pointlist.axis_list import names_of
 from olp.proof.judgement import groups_of
 from olp.workflows.compare import CompareOptions, Comparison, Side, compared
 from olp.workflows.compare_runs import Ground
+from olp.workflows.joints.along import Along
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.session import PathLike
 
@@ -73,19 +73,12 @@ def _poses(path: JointPath, file: str) -> Points:
 
 def ground_of(path: JointPath) -> Ground:
     """The path of the nominal tip in workpiece coordinates, by chords."""
-    rows = _known(path)
-    rows = rows[np.isfinite(path.start[rows]).all(axis=1)]
-    tool, tip = path.tool[rows], path.tip[rows]
-    begin, end = (path.motion.axes(place[rows], tool, tip) for place in (path.start, path.end))
-    tips = [path.motion.nominal(axes, tool).position for axes in (begin, end)]
-    way = np.maximum(np.linalg.norm(tips[1] - tips[0], axis=1), path.curves.length_mm(rows))
-    count = np.maximum(
-        np.ceil(way / _STEP_MM).astype(np.int64), np.maximum(path.samples(rows, begin, end), 1)
-    )
-    owner, step = spread(count)
-    move = rows[owner]
-    places = _nominal(path, move, path.at(move, (step + 1) / count[owner])).position
-    points, move = np.vstack((tips[0][:1], places)), np.append(move[:1], move)
+    along = Along.of(path, _STEP_MM).begun()
+    places, move = along.nominal().position, along.move
+    first = move[:1]
+    begin = path.motion.axes(path.start[first], path.tool[first], path.tip[first])
+    start = path.motion.nominal(begin, path.tool[first]).position
+    points, move = np.vstack((start, places)), np.append(first, move)
     feed = path.feed if path.feed.any() else path.judged
     through = Path.through(points, move, feed[move])
     line = path.program.in_original().toolpath.line.astype(np.int64)

@@ -238,11 +238,19 @@ def findings_of(
         found.append(finding("OLP107", "no feed move was corrected at a known position"))
     if run.calibration is not None:
         found += _outside(path, plan, run)
-        found += [] if run.machine.real_time is not None else _held(run.calibration)
-        until = run.calibration.valid_until
-        if until is not None and date is not None and date > until:
-            found.append(finding("OLP401", f"the calibration was valid until {until}"))
-    return tuple(found)
+    return (*found, *calibration_findings(run, date))
+
+
+def calibration_findings(run: JointRun, date: datetime.date | None) -> list[Finding]:
+    """What speaks against the calibration of a run: its age, and the payload that it is for."""
+    calibration = run.calibration
+    if calibration is None:
+        return []
+    found = [] if run.machine.real_time is not None else _held(calibration)
+    until = calibration.valid_until
+    if until is not None and date is not None and date > until:
+        found.append(finding("OLP401", f"the calibration was valid until {until}"))
+    return found
 
 
 def _coarse_digits(path: JointPath, plan: JointPlan, proof: JointProof) -> str:
@@ -291,21 +299,27 @@ def _held(calibration: JointCalibration) -> list[Finding]:
 
 def outside_box(path: JointPath, plan: JointPlan, run: JointRun) -> list[tuple[int, str]]:
     """Lines whose commands leave the calibrated values of an axis, each with a sentence."""
-    assert run.calibration is not None
-    structure, found = path.motion.structure, []
     # what only goes past an end brings the tool nowhere
     ends = ~(plan.stands & (plan.share == 1.0))
-    for column, name in enumerate(structure.order):
+    return out_of_box(plan.move, np.where(ends[:, None], plan.axes, np.nan), path, run)
+
+
+def out_of_box(move: Index, axes: Array, path: JointPath, run: JointRun) -> list[tuple[int, str]]:
+    """Lines of moves (r,) whose axis values (r, axes) leave the calibrated ones, each with a sentence; none
+    without a calibration."""
+    structure, found = path.motion.structure, []
+    for column, name in enumerate(structure.order if run.calibration is not None else ()):
+        assert run.calibration is not None
         low, high = run.calibration.box[name]
         if name in structure.endless and high - low > TURN_DEG - _AT_END:
             continue
-        value = np.where(ends, plan.axes[:, column], np.nan)
+        value = axes[:, column]
         with np.errstate(invalid="ignore"):
             out = np.flatnonzero((value < low - _AT_END) | (value > high + _AT_END))
         unit = structure.units[column]
         found += [
             (
-                int(path.line[plan.move[row]]),
+                int(path.line[move[row]]),
                 f"the command {name} = {value[row]:.6g} {unit} is outside the calibrated {low:g} to {high:g}",
             )
             for row in out.tolist()

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from olp.compensation.joints.sampling import spread
 from olp.core.arrays import Array, Index
 from olp.core.units import RAD_PER_URAD
 from olp.core.values import dataclass
 from olp.kinematics.pose_axes import led_in_order
 from olp.kinematics.poses import rotation_vector
+from olp.program.origin import Files, Origin
 from olp.workflows.flatten import UnrollOptions
+from olp.workflows.joints.along import Along
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.session import PathLike
 from olp.workflows.shown import Shown
@@ -20,8 +21,9 @@ from olp.workflows.shown import Shown
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointSimulation(Shown):
-    """(n, 3) positions of the tip in workpiece coordinates, mm, (n, 3) turns of the tool against the nominal
-    one, rad, (n, axes) nominal axis values, and the line of each. The report is "olp-simulation-1"."""
+    """(n, 3) positions of the tip in coordinates of the part where its zero was set, mm, (n, 3) turns of the
+    tool against the nominal one, rad, (n, axes) nominal axis values, and the line of each. Lines count
+    through the files of an unrolled program (`origin`). The report is "olp-simulation-1"."""
 
     points_mm: Array
     turns_rad: Array
@@ -30,15 +32,18 @@ class JointSimulation(Shown):
     columns: tuple[str, ...]
     report: dict[str, Any]
     findings: tuple[()] = ()
+    origin: Origin | None = None
 
     def to_csv(self) -> bytes:
-        """`X_mm,Y_mm,Z_mm,RX_urad,RY_urad,RZ_urad`, the commanded axis values, and the line."""
+        """`X_mm,Y_mm,Z_mm,RX_urad,RY_urad,RZ_urad`, the commanded axis values, and the line; `file` too where
+        lines are of several."""
+        files = Files(self.origin)
         head = ["X_mm", "Y_mm", "Z_mm", "RX_urad", "RY_urad", "RZ_urad"]
         head += [f"axis_{column}" for column in self.columns]
         values = np.hstack((self.points_mm, self.turns_rad / RAD_PER_URAD, self.axes))
-        rows = ["# frame=workpiece", ",".join((*head, "line"))]
+        rows = ["# frame=workpiece", ",".join((*head, f"line{files.head}"))]
         rows += [
-            ",".join((*(f"{value:.6f}" for value in row), str(line)))
+            ",".join((*(f"{value:.6f}" for value in row), files.cells(line)))
             for row, line in zip(values.tolist(), self.line.tolist(), strict=True)
         ]
         return ("\n".join(rows) + "\n").encode()
@@ -55,23 +60,12 @@ def simulated(run: JointRun, options: UnrollOptions, step_mm: float) -> JointSim
     """As `simulate_joints`, for a run that is loaded."""
     with run.program.errors():
         _, path = run.read(run.program, options)
-    motion = path.motion
-    rows = np.flatnonzero(np.isfinite(path.end).all(axis=1) & np.isfinite(path.start).all(axis=1))
-    tool, tip = path.tool[rows], path.tip[rows]
-    ends = [motion.axes(place[rows], tool, tip) for place in (path.start, path.end)]
-    way = np.linalg.norm(
-        motion.nominal(ends[1], tool).position - motion.nominal(ends[0], tool).position, axis=1
-    )
-    way = np.maximum(way, path.curves.length_mm(rows))
-    count = np.maximum(np.ceil(way / step_mm).astype(np.int64), 1)
-    count = np.maximum(count, path.samples(rows, *ends))
-    owner, step = spread(count)
-    move = rows[owner]
-    axes = motion.axes(path.at(move, (step + 1) / count[owner]), path.tool[move], path.tip[move])
-    nominal, actual = motion.nominal(axes, path.tool[move]), motion.actual(axes, path.tool[move])
+    along = Along.of(path, step_mm).begun()
+    nominal, actual = along.nominal(), along.actual()
     turns = rotation_vector(actual.rotation @ np.swapaxes(nominal.rotation, -1, -2))
-    structure = motion.structure
+    structure, move = path.motion.structure, along.move
     names = tuple(f"{name}_{unit}" for name, unit in zip(structure.order, structure.units, strict=True))
     report = {"schema": "olp-simulation-1", "frame": "workpiece", "points": len(move), **run.heads()}
-    axes = led_in_order(structure, axes)
-    return JointSimulation(actual.position, turns, axes, path.line[move].astype(np.int64), names, report)
+    axes = led_in_order(structure, along.axes)
+    line = path.program.in_original().toolpath.line[move].astype(np.int64)
+    return JointSimulation(actual.position, turns, axes, line, names, report, origin=path.program.origin)
