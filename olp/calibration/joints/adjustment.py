@@ -20,11 +20,17 @@ from olp.kinematics.errors import Payload
 from olp.kinematics.poses import Poses, shift, tilts
 
 #: Most steps of Gauss-Newton; from the nominal machine four suffice.
-_STEPS = 20
+_STEPS = 40
 #: Unknowns have settled where they change by less than this share of their uncertainty.
 _SETTLED = 1e-3
 #: A step of an unknown is at most so many standard deviations of its prior.
 _LONGEST = 5.0
+#: After so many steps one that goes up is halved: errors multiply each other, and bend the readings.
+_FREE = 2
+#: Where steps do not end, places are as good where they are this near, in standard deviations.
+_ALIKE_SIGMA = 1.0
+#: The same in chi-square.
+_ALIKE_CHI = 0.2
 #: Half the steps of differences of readings by shifts, mm.
 _HALF_MM = 1e-3
 #: The same by turns, rad.
@@ -196,8 +202,15 @@ def adjusted(model: Model, starts: Sequence[Start], most: int = _STEPS) -> Joint
     owns = [np.zeros(len(start.prior)) for start in starts]
     precision = model.precision
     before, longest = np.inf, _LONGEST * model.prior
-    for _ in range(most):
+    base, least = (theta, owns), np.inf
+    for number in range(most):
         blocks = [block_of(model, theta, start, own) for start, own in zip(starts, owns, strict=True)]
+        score = _score(blocks, theta, owns) + float(theta @ precision @ theta)
+        if number >= _FREE and score > least + _SETTLED:
+            theta = 0.5 * (base[0] + theta)
+            owns = [0.5 * (one + other) for one, other in zip(base[1], owns, strict=True)]
+            continue
+        base, least = (theta, owns), score
         normal = Normal.of(len(theta))
         try:
             for block in blocks:
@@ -211,13 +224,14 @@ def adjusted(model: Model, starts: Sequence[Start], most: int = _STEPS) -> Joint
             float(np.sum((residuals_of(b, new)[1] / residuals_of(b, new)[2]) ** 2)) for b in blocks
         )
         owns = [residuals_of(block, new)[0] for block in blocks]
-        still = bool(np.all(np.abs(new - theta) < _SETTLED * sigma))
-        theta = new
-        if still and abs(chi_square - before) < _SETTLED * (1.0 + _SETTLED * chi_square):
+        most_moved = float(np.max(np.abs(new - theta) / sigma, initial=0.0))
+        theta, change, before = new, abs(chi_square - before), chi_square
+        if most_moved < _SETTLED and change < _SETTLED * (1.0 + _SETTLED * chi_square):
             break
-        before = chi_square
     else:
-        raise _unsettled(model)
+        # along a curved valley of unknowns that look almost alike all places are as good
+        if most_moved > _ALIKE_SIGMA or change > _ALIKE_CHI:
+            raise _unsettled(model)
     sources: list[Source] = []
     chi_square = 0.0
     for start, own in zip(starts, owns, strict=True):
@@ -238,6 +252,15 @@ def adjusted(model: Model, starts: Sequence[Start], most: int = _STEPS) -> Joint
         freedom,
         _rank(blocks, model),
     )
+
+
+def _score(blocks: Sequence[Block], theta: Array, owns: Sequence[Array]) -> float:
+    """Chi-square of the rows of instruments about unknowns theta (k,) and those of their own."""
+    total = 0.0
+    for block, own in zip(blocks, owns, strict=True):
+        (chunk,) = block.chunks()
+        total += float(np.sum(((chunk.y - chunk.rows @ theta - chunk.local @ own) / chunk.sigma) ** 2))
+    return total
 
 
 def _unsettled(model: Model) -> CannotCompute:

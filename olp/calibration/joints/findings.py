@@ -8,7 +8,14 @@ from pathlib import PurePath
 
 import numpy as np
 
-from olp.calibration.joints.adjustment import JointFit, LeftOut, adjusted, fit_joints, starts_of
+from olp.calibration.joints.adjustment import (
+    OUTLIER,
+    JointFit,
+    LeftOut,
+    adjusted,
+    fit_joints,
+    starts_of,
+)
 from olp.calibration.joints.deciding import AGREES, DECIDED, log_odds, odds_in_words
 from olp.calibration.joints.mistakes import RIGHT, mistakes, row_mistakes
 from olp.calibration.joints.payloads import unstated_payloads
@@ -168,7 +175,7 @@ def _worst_rows(model: Model, readings: Sequence[Reading], before: float, stated
     """Single readings without which the others fit: what they are, and reduced chi-square without them.
     `before` and `stated` are reduced chi-square and the score with them."""
     fit = without_worst(model, readings, RIGHT * before if np.isfinite(before) else _PLAUSIBLE)
-    if fit is None:
+    if fit is None or any(one.deviations < OUTLIER for one in fit.left_out):
         return None
     told = [words for words, _ in row_mistakes(fit, readings)]
     lines = ", ".join(f"{PurePath(one.source).name} line {one.row}" for one in fit.left_out)

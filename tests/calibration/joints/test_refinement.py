@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from calibration.joints.simulated import known_machine, read, true_machine
 
 from olp.calibration.joints.adjustment import JointFit, fit_joints
 from olp.calibration.joints.deciding import AGREES
+from olp.calibration.joints.findings import fit_or_refuse
 from olp.calibration.joints.refinement import refine_joints, years_until
 from olp.calibration.joints.unknowns import Model
 from olp.core.arrays import Array
@@ -68,3 +71,29 @@ def test_the_day_of_measuring_again() -> None:
     assert years_until(2.0, 1.0, 0.5) == 0.0
     assert years_until(1.0, 2.0, 0.0) is None
     assert years_until(1.0, 2.0, 0.5) == pytest.approx(2.0)
+
+
+@pytest.mark.slow
+def test_errors_that_one_reflector_hardly_parts_settle() -> None:
+    """Unknowns that look almost alike leave a curved valley: full steps go from side to side there."""
+    model, theta, values = true_machine("arm_6r_kr6", 1, 51)
+    old, new = (
+        replace(read("points", model.machine(theta).actual(part), part, seed, 1, noise=0.25), sigma=0.005)
+        for seed, part in ((1, values[:36]), (10, values[36:]))
+    )
+    first = fit_joints(model, [old])
+    known = Model(model.structure, model.unknowns, base=model.errors(first.theta), known=first.covariance)
+    assert refine_joints(known, [new]).agreement < AGREES
+
+
+@pytest.mark.slow
+def test_good_readings_that_settle_nowhere_are_not_called_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, theta, values = true_machine("xyzac_trunnion", 0, 12)
+    new = read("points", model.machine(0.01 * theta).actual(values), values, 1)
+
+    def settles_nowhere(*_: object) -> None:
+        raise CannotCompute("no steps settle")
+
+    monkeypatch.setattr("olp.calibration.joints.findings.fit_joints", settles_nowhere)
+    with pytest.raises(CannotCompute, match="no steps"):
+        fit_or_refuse(model, [new])
