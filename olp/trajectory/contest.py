@@ -17,16 +17,15 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute
 from olp.core.values import dataclass
 from olp.trajectory.audit import Ratios, ratios, slowing
-from olp.trajectory.bends import levelled, outward
 from olp.trajectory.critical import seconds
 from olp.trajectory.deviation import deviation_bound
-from olp.trajectory.merge import shared, variants
+from olp.trajectory.merge import shared
 from olp.trajectory.motion import Motion
 from olp.trajectory.optimise import optimised
 from olp.trajectory.route import Route
 from olp.trajectory.solvers import LAST, OPTIMISED, SOLVERS, TUBE, Candidate, Run, Solver
-from olp.trajectory.spread import spread
 from olp.trajectory.tube import in_tube
+from olp.trajectory.ways import OWN, WAYS, Paths, Way, windows
 
 #: a limit may be reached; this share above it is rounding
 _ROUNDING = 1e-9
@@ -38,8 +37,6 @@ _AGAIN = 1e-2
 _SEARCHES = 3
 #: share of the time that jerk costs in closed form which optimising does not recover
 _JERK_COST = 0.1
-#: waypoints beyond which short steps are not merged unless the run is optimised: a second path takes memory
-_LONG = 200_000
 #: exceptions of a solver that fails
 _FAILURES = (ArithmeticError, ValueError, IndexError, CannotCompute)
 
@@ -63,20 +60,25 @@ class Solution:
 
 
 def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Solution | None:
-    """The fastest solution of the candidates, along the route and its variants. Where all fail, the other
-    solvers are tried in order; exact stops come last, as they are never the fastest."""
+    """The fastest solution of the candidates, along the route and the ways beside it. Where all fail, the
+    other solvers are tried in order; exact stops come last, as they are never the fastest."""
     best: Solution | None = None
     smooth: list[Run] = []
-    entries, lines = _entries(run, candidates, optimise)
-    for own, candidate in entries:
-        if best is None or candidate.least_s < best.duration_s:
-            best = _better(run, candidate.solver, best, own)
-            # a path over lines instead of curves has tight bends between them, which speeds make no better
-            if candidate.solver.bends and own not in lines:
+    paths = Paths(run)
+    entries, bending = _entries(paths, candidates, optimise)
+    for entry in entries:
+        if best is None or entry.least_s < best.duration_s:
+            own = paths.along(entry.way)
+            if own is None:
+                continue
+            best = _better(run, entry.solver, best, own)
+            # speeds make the tight bends of a level way no better
+            if entry.solver.bends and not entry.way.level:
                 smooth.append(own)
     if optimise and best is not None and any(candidate.solver.bends for candidate in candidates):
         # optimising takes most of the time: only along the path that promises most
-        best = _optimised(run, best, min(smooth or [run], key=_promised_s))
+        most = None if bending is None else paths.along(bending)
+        best = _optimised(run, best, most or min(smooth or [run], key=_promised_s))
     asked = [candidate.solver for candidate in candidates]
     for solver in (*SOLVERS, LAST):
         if best is None and solver not in asked:
@@ -102,28 +104,50 @@ def _from_motion(motion: Motion, run: Run) -> Motion:
     return in_tube(run.route, run.limits, motion)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Entry:
+    """A way, the solver that drives it, and the least seconds that it is expected to take."""
+
+    way: Way
+    solver: Solver
+    least_s: float
+
+
 def _entries(
-    run: Run, candidates: tuple[Candidate, ...], optimise: bool
-) -> tuple[list[tuple[Run, Candidate]], list[Run]]:
-    """The solvers with the runs that they drive, and those runs that are over lines instead of noise.
-    They are the run itself, and its variants without short steps, with corners moved outward, and over lines.
-    Where speeds are optimised, there is one with bends spread, too."""
-    entries = [(run, candidate) for candidate in candidates]
-    lines: list[Run] = []
-    if len(run.route) <= _LONG or optimise:
-        bending = tuple(solver for solver in SOLVERS if solver.bends)
-        fewer = variants(run.route)
-        own = [(solver, Run(route, run.limits)) for route in fewer for solver in SOLVERS]
-        level, moved = levelled(run.route), outward(run.route)
-        even = spread((fewer or [run.route])[0], run.limits) if optimise else None
-        lines += [] if level is None else [Run(level, run.limits)]
-        bent = [*lines, *(Run(route, run.limits) for route in (moved, even) if route is not None)]
-        own += [(solver, some) for some in bent for solver in bending]
-        for solver, some in own:
-            entries.append((some, Candidate(solver, float(solver.least_s(some.route, run.limits).sum()))))
-        # the most promising first, as it may spare the others
-        entries.sort(key=lambda entry: entry[1].least_s)
-    return entries, lines
+    paths: Paths, candidates: tuple[Candidate, ...], optimise: bool
+) -> tuple[list[_Entry], Way | None]:
+    """The ways with the solvers that drive them, the most promising first, as it may spare the others. Of a
+    long run windows show which is first, and along which way speeds are optimised; others spare none."""
+    some = windows(paths.run)
+    if some is None:
+        return _all(paths, candidates, optimise), None
+    parts = Paths(some)
+    first: list[tuple[float, _Entry]] = []
+    bending: list[tuple[float, Way]] = []
+    for entry in _all(parts, candidates, optimise):
+        own = parts.along(entry.way)
+        solution = _better(some, entry.solver, None, own)
+        if solution is not None and own is not None:
+            first.append((solution.duration_s, entry))
+            if optimise and entry.solver.bends and not entry.way.level:
+                bending.append((_promised_s(own), entry.way))
+    first.sort(key=lambda pair: pair[0])
+    entries = [replace(entry, least_s=math.inf) for _, entry in first]
+    return entries, min(bending, key=lambda pair: pair[0])[1] if bending else None
+
+
+def _all(paths: Paths, candidates: tuple[Candidate, ...], optimise: bool) -> list[_Entry]:
+    """All ways with all solvers that drive them."""
+    limits = paths.run.limits
+    entries = [_Entry(OWN, candidate.solver, candidate.least_s) for candidate in candidates]
+    for way in WAYS:
+        own = paths.along(way) if optimise or not way.even else None
+        if own is not None:
+            entries += [
+                _Entry(way, solver, float(solver.least_s(own.route, limits).sum())) for solver in way.solvers
+            ]
+    entries.sort(key=lambda entry: entry.least_s)
+    return entries
 
 
 def contest(run: Run, candidates: tuple[Candidate, ...]) -> list[tuple[int, int, Solution]]:

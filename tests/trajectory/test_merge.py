@@ -16,11 +16,11 @@ from olp.trajectory.merge import merged
 from olp.trajectory.plan import plan
 
 
-def jogs(size_mm: float) -> np.ndarray:
-    """100 mm along X with a step in Y every 10 mm, to one side and back in turn."""
-    y = size_mm * (np.arange(10) % 2)
-    x = 10.0 * np.arange(11)
-    return np.stack((np.repeat(x, 2)[1:-1], np.repeat(y, 2), np.zeros(20)), axis=1)
+def jogs(size_mm: float, count: int = 10) -> np.ndarray:
+    """Moves of 10 mm along X with steps in Y between, to one side and back in turn."""
+    y = size_mm * (np.arange(count) % 2)
+    x = 10.0 * np.arange(count + 1)
+    return np.stack((np.repeat(x, 2)[1:-1], np.repeat(y, 2), np.zeros(2 * count)), axis=1)
 
 
 def circle(jog_mm: float, radius_mm: float = 50.0, way: int = 1) -> np.ndarray:
