@@ -238,3 +238,20 @@ def test_a_class_of_the_standard_library_may_inherit_from_a_frozen_one() -> None
     assert (value.a, value.b) == (1, 2) and [f.name for f in dataclasses.fields(value)] == ["a", "b"]
     with pytest.raises(dataclasses.FrozenInstanceError):
         value.a = 3  # type: ignore[misc]
+
+
+def test_a_frozen_value_with_many_fields_is_one_of_its_class_when_it_is_made() -> None:
+    names = [f"n{k}" for k in range(values._MANY + 1)]
+    body = {"__annotations__": dict.fromkeys(names, "int"), "n6": 7}
+    made = values.dataclass(frozen=True, slots=True)(type("Wide", (), dict(body)))
+    seen: list[type] = []
+    body |= {"__post_init__": lambda self: seen.append(type(self))}
+    checked = values.dataclass(frozen=True, slots=True)(type("Checked", (), body))
+    plain = type("Plain", (made,), {})
+    for cls in [made, checked, plain] * (values._FEW + 2):
+        value: Any = cls(*range(6))
+        assert type(value) is cls
+        assert dataclasses.astuple(value) == (*range(6), 7)
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            value.n0 = 3
+    assert set(seen) == {checked}
