@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 #: Words of a call that every verb takes on such a machine.
 ALWAYS = ("program", "programs", "nominal", "corrected", "machine", "job", "dialect", "flatten",
            "expand_cycles", "peck_clearance_mm", "output", "tolerance_um", "tolerance_urad", "outside_box",
-           "date", "fail_on", "as_json", "quiet", "force", "step_mm")  # fmt: skip
+           "date", "fail_on", "as_json", "quiet", "force", "step_mm", "part_tolerance_um")  # fmt: skip
 
 
 #: What `olp correct` takes beside these.
@@ -58,7 +58,7 @@ RETIME = (
 )  # fmt: skip
 
 #: What `olp view` takes.
-VIEW = ("live", "port", "no_time", "measured", "part_tolerance_um")
+VIEW = ("live", "port", "no_time", "measured")
 
 
 _LOG = (
@@ -92,9 +92,6 @@ WHY_NOT = {
         "as an uncertainty of poses"
     ),
     "part_frame": "work offsets turn with the table there; set the frame at the control",
-    "part_tolerance_um": (
-        "no verdict on a part is given there; compare the uncertainty in the report with the tolerance"
-    ),
     "plot": "the curves are those of the machine; name the machine file alone, as in "
             "olp inspect machine.toml --plot curves.svg",
     "positions": _LOG,
@@ -339,14 +336,13 @@ def view(
     first = runs[0]
 
     def make() -> Review:
-        from olp.review.joints import Runs, reviewed
+        from olp.review.joints import reviewed
         from olp.workflows.joints.correct import JointOptions
 
         # files may have changed since the last call
         run = runs.pop() if runs else run_of(program, machine, job)
         second = None if corrected is None else source(run.sources, corrected)
-        shown = Runs(tuple(measured), words["part_tolerance_um"])
-        return reviewed(run, options_of(JointOptions, words), second, shown, time=time)
+        return reviewed(run, options_of(JointOptions, words), second, measured, time=time)
 
     meshes = [mesh.file for mesh in first.job.meshes]
     return make, (*first.files, *files_of(corrected, *measured), *meshes), program or first.program.name

@@ -267,20 +267,24 @@ def verdict(
     judged, a feed move could not, or the part is good with a probability that is too low. `place` puts a line
     into words. `questions` are the questions that were asked, each with its answer `ok` and `sentence`."""
     numerical = _numerical(table)
-    part = None if part_tolerance_um is None else _part(table, part_tolerance_um, uncertainty)
+    part = None
+    if part_tolerance_um is not None:
+        within = None if uncertainty is None else uncertainty["within"]
+        probability = None if within is None else float(within["after"]["program"])
+        part = part_of(table.largest_mm() * UM_PER_MM, part_tolerance_um, probability)
     errors = sorted({f.code for f in findings if f.severity >= Severity.ERROR} - _OWN)
     known = None if numerical["unknown"] else True
     sentence = _numerical_sentence(numerical, place)
-    questions = [question("program", _all((numerical["holds"], known)), sentence)]
+    questions = [question("program", every((numerical["holds"], known)), sentence)]
     sentences = [sentence]
     if numerical["unknown"]:
         sentences.append(f"{numerical['unknown']} feed moves to unknown positions are not judged.")
     if part is not None:
-        sentences.append(_part_sentence(part))
-        questions.append(question("part", _part_answer(part), sentences[-1]))
+        sentences.append(part_sentence(part))
+        questions.append(question("part", part_answer(part), sentences[-1]))
     if errors:
         sentences.append(f"Not to be run as it is: {', '.join(errors)}.")
-    ok = _all((*(one["ok"] for one in questions), not errors))
+    ok = every((*(one["ok"] for one in questions), not errors))
     return {
         "ok": ok, "numerical": numerical, "part": part, "errors": errors, "sentences": sentences,
         "questions": questions,
@@ -313,7 +317,7 @@ def with_measured(predicted: dict[str, Any], runs: dict[str, Any]) -> dict[str, 
     """One verdict of a prediction and of what was measured: it fails where either does, and is open where
     either is."""
     both = {key: [*predicted[key], *runs[key]] for key in ("sentences", "questions")}
-    return predicted | runs | both | {"ok": _all((predicted["ok"], runs["ok"]))}
+    return predicted | runs | both | {"ok": every((predicted["ok"], runs["ok"]))}
 
 
 #: The questions that a verdict answers.
@@ -329,7 +333,7 @@ def question(name: str, ok: bool | None, sentence: str) -> dict[str, Any]:
     return {"name": name, "question": QUESTIONS[name], "ok": ok, "sentence": sentence}
 
 
-def _all(answers: Iterable[bool | None]) -> bool | None:
+def every(answers: Iterable[bool | None]) -> bool | None:
     """False where one of the answers is, else None where one is open."""
     known = list(answers)
     return False if False in known else None if None in known else True
@@ -353,10 +357,9 @@ def _numerical(table: Judgements) -> dict[str, Any]:
     }
 
 
-def _part(table: Judgements, tolerance_um: float, uncertainty: dict[str, Any] | None) -> dict[str, Any]:
-    largest_um = table.largest_mm() * UM_PER_MM
-    within = None if uncertainty is None else uncertainty["within"]
-    probability = None if within is None else float(within["after"]["program"])
+def part_of(largest_um: float, tolerance_um: float, probability: float | None) -> dict[str, Any]:
+    """What is known of a part: the largest deviation that is predicted beside its tolerance, and the
+    probability of being within that, None where the calibration states no uncertainty."""
     return {
         "tolerance_um": tolerance_um,
         "largest_um": largest_um,
@@ -366,9 +369,9 @@ def _part(table: Judgements, tolerance_um: float, uncertainty: dict[str, Any] | 
     }
 
 
-def _part_answer(part: dict[str, Any]) -> bool | None:
+def part_answer(part: Mapping[str, Any]) -> bool | None:
     """Whether the part is good: open where that is not probable enough."""
-    return _all((part["holds"], part["probability"] is None or part["probable"] or None))
+    return every((part["holds"], part["probability"] is None or part["probable"] or None))
 
 
 def _um(value: float) -> str:
@@ -388,7 +391,8 @@ def _numerical_sentence(numerical: dict[str, Any], place: Callable[[int], str]) 
     )
 
 
-def _part_sentence(part: dict[str, Any]) -> str:
+def part_sentence(part: Mapping[str, Any]) -> str:
+    """The verdict on a part, in words."""
     tolerance = f"part tolerance of {part['tolerance_um']:g} um"
     if not part["holds"]:
         return f"ABOVE the {tolerance}: the corrected path alone is {_um(part['largest_um'])} um off."

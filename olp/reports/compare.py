@@ -47,6 +47,7 @@ def to_text(report: Report) -> str:
         _heads(report),
         _frame(report),
         _verdict(report),
+        _uncertainty(report),
         _before_after(report),
         _runs(report),
         _poses(report),
@@ -115,6 +116,27 @@ def _frame(report: Report) -> Iterator[str]:
 
 def _verdict(report: Report) -> Iterator[str]:
     yield from wrapped((report.get("verdict") or {}).get("sentences") or ())
+
+
+def _uncertainty(report: Report) -> Iterator[str]:
+    if "uncertainty" in report:
+        yield shown.title("Uncertainty of the calibration there, beside one shift and turn of all poses")
+        yield from pairs([(f"  {name}", value) for name, value in uncertainty_rows(report)])
+
+
+def uncertainty_rows(report: Report) -> list[tuple[str, str]]:
+    """How well the calibration knows the poses that are compared, in words."""
+    part = report["uncertainty"]
+    tip, turn, share = part["band_um"], part["band_urad"], part.get("measured_within")
+    factor = part["coverage_factor"]
+    within = "" if share is None else f"{100.0 * share:.0f} % of the measured points that count"
+    return [
+        ("Tip", f"+-{number(tip['median_um'])} um median, {number(tip['max_um'])} um largest "
+         f"(expanded, k = {factor:g}, in the worst direction)"),
+        ("Tool", f"+-{number(turn['median_urad'])} urad median, {number(turn['max_urad'])} urad largest"),
+        ("Within it", within),
+        ("From", part["source"]),
+    ]  # fmt: skip
 
 
 def _before_after(report: Report) -> Iterator[str]:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from olp.reports.compare import TURN_FIGURES, absorbed_by_fit, change, table_rows
+from olp.reports.compare import TURN_FIGURES, absorbed_by_fit, change, table_rows, uncertainty_rows
 from olp.reports.document import Block, Document, Grid, Pairs, Paragraph, Section
 from olp.reports.document_parts import (
     MOST_POSES,
@@ -39,6 +39,7 @@ def comparison(report: Report, plots: Plots, version: str, date: datetime.date |
         Section("Measurement", list(_measurement(report))),
         Section("Validation by measurement", list(_measured(report, plots))),
         *test_sections(report, plots),
+        Section("Uncertainty", list(_uncertainty(report))),
         Section("Findings and limits", list(notice_blocks(report))),
         Section("Documentation", list(documentation_blocks(report, version, date))),
     ]
@@ -51,6 +52,13 @@ def comparison(report: Report, plots: Plots, version: str, date: datetime.date |
         kept,
         footer_of(version),
     )
+
+
+def _uncertainty(report: Report) -> Iterator[Block]:
+    if "uncertainty" in report:
+        yield Paragraph("How well the calibration knows these poses, beside one shift and turn of all:")
+        yield Pairs(uncertainty_rows(report))
+        yield Paragraph(f"Not included: {'; '.join(report['uncertainty']['not_included'])}.")
 
 
 def _comparison_result(report: Report) -> Iterator[Block]:

@@ -35,7 +35,7 @@ def correction(report: Report, version: str, date: datetime.date | None) -> Docu
     name = report["program"]["name"] or "program"
     return Document(
         "Numerical compensation of a program", subtitle_of(name, report, date),
-        (report["deviation"]["holds"], verdict_of(report)), kept, footer_of(version),
+        (report["verdict"]["ok"], verdict_of(report)), kept, footer_of(version),
     )  # fmt: skip
 
 

@@ -99,14 +99,14 @@ def _verdict(report: Report) -> Iterator[str]:
 
 
 def verdict_of(report: Report) -> str:
-    """What the proof says, in two lines."""
+    """What the proof says, in two lines; with a part tolerance one more on the part."""
     deviation = report["deviation"]
     within = "within" if deviation["holds"] else "NOT within"
     return (
         f"The corrected path is {within} {number(deviation['allowed_um'])} um and "
         f"{number(deviation['allowed_urad'])} urad of the nominal one\n"
         f"(tolerances {number(report['tolerance_um'])} um and {number(report['tolerance_urad'])} urad, and "
-        "rounding to the last digit)."
+        "rounding to the last digit)." + (f"\n{report['part']['sentence']}" if "part" in report else "")
     )
 
 

@@ -24,7 +24,7 @@ from olp.files.sources import Source
 from olp.kinematics.correction import deviations
 from olp.proof.joint_places import Places, visited
 from olp.proof.joint_sides import Sides
-from olp.proof.judgement import Judgements, groups_of, question
+from olp.proof.judgement import Judgements, every, groups_of, part_answer, question
 from olp.proof.proof import Counts
 from olp.reports.joints import verdict_of
 from olp.review.features.moves import digit_mm
@@ -91,39 +91,37 @@ def view_joints(
     `corrected` is the corrected program, which is proved as in `verify_joints`. Without it the program is
     corrected as in `correct_joints`. Without `time`, or without limits of motion in the machine file, the
     motion is not planned: times are those of the programmed feed. `measured` are files of measured tips, one
-    run each, as `compare` takes them; `part_tolerance_um` is what these are judged by, that of the job where
-    it is None. Raises as these, and InputError for points that are not on the path.
+    run each, as `compare` takes them; `part_tolerance_um` is what these and the part are judged by, that of
+    the job where it is None. Raises as these, and InputError for points that are not on the path.
     """
     options = JointOptions(
         tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, flatten=flatten,
-        expand_cycles=expand_cycles, outside_box=outside_box, date=date,
+        expand_cycles=expand_cycles, outside_box=outside_box, part_tolerance_um=part_tolerance_um, date=date,
     )  # fmt: skip
     run = JointRun.of(program, machine, job)
-    runs = Runs(tuple(measured), part_tolerance_um)
     second = None if corrected is None else run.sources.source(corrected, program)
-    return reviewed(run, options, second, runs, time=time)
-
-
-@dataclass(frozen=True, slots=True)
-class Runs:
-    """Files of measured runs, and the part tolerance by which the call has them judged."""
-
-    measured: tuple[PathLike, ...] = ()
-    part_tolerance_um: float | None = None
+    return reviewed(run, options, second, measured, time=time)
 
 
 def reviewed(
-    run: JointRun, options: JointOptions, corrected: Source | None, runs: Runs, *, time: bool
+    run: JointRun,
+    options: JointOptions,
+    corrected: Source | None,
+    measured: Sequence[PathLike],
+    *,
+    time: bool,
 ) -> Review:
     """As `view_joints`, for a run that is loaded."""
     if corrected is None:
-        return page_of(run, correction_of(run, options), options, "", runs, time=time)
-    return page_of(run, verification_of(run, corrected, options), options, corrected.name, runs, time=time)
+        return page_of(run, correction_of(run, options), options, "", measured, time=time)
+    return page_of(
+        run, verification_of(run, corrected, options), options, corrected.name, measured, time=time
+    )
 
 
 def page_of(
     run: JointRun, done: ProvedJoints, options: JointOptions, corrected_name: str,
-    runs: Runs | None = None, *, time: bool,
+    measured: Sequence[PathLike] = (), *, time: bool,
 ) -> Review:  # fmt: skip
     """The review of two programs that are proved. Raises CannotCompute where no position is known."""
     path, second = done.nominal, done.corrected
@@ -144,13 +142,13 @@ def page_of(
         moment, motion = filled(timing.seconds(samples.part, samples.within)), joint_table(timing.stretches)
     else:
         moment = by_feed(_seconds(run, nominal, samples), samples)
-    known = known_of(run, options.date)
+    known, part_um = known_of(run, options.date), run.part_tolerance_um(options.part_tolerance_um)
     table, report = _table(done, options), done.report | {"verdict": _verdict(done)}
     matched: tuple[Matched, ...] = ()
     digests: tuple[str, ...] = ()
-    if runs is not None and runs.measured:
-        files = [measured_points(name, run, path) for name in runs.measured]
-        matched, table, report = _with_runs(run, path, samples, origin, files, runs, (table, report))
+    if measured:
+        files = [measured_points(name, run, path) for name in measured]
+        matched, table, report = _with_runs(part_um, path, samples, origin, files, (table, report))
         digests = tuple(points.sha256 for points in files)
     return Review(
         Scene(
@@ -184,18 +182,18 @@ def page_of(
             turn_urad={name: angle / RAD_PER_URAD for name, angle in seen.off_rad.items()},
             units=dict(zip(machine.structure.order, machine.structure.units, strict=True)),
             straight=False,
-            uncertainty=None if known is None else _uncertainty(run, path, seen, known, runs),
+            uncertainty=None if known is None else _uncertainty(run, path, seen, known, part_um),
             planned=planned,
         )
     )
 
 
 def _uncertainty(
-    run: JointRun, path: JointPath, seen: _Seen, known: Known, runs: Runs | None
+    run: JointRun, path: JointPath, seen: _Seen, known: Known, part_um: float | None
 ) -> TipUncertainty:
     """Bands of tips at the samples and, where a part tolerance is stated, probabilities of being beyond."""
     covariance = known.spread(run, path, seen.axes, path.tool[seen.places.move]).tip
-    band, part_um = bands(covariance).astype(np.float32), _part_tolerance_um(run, runs)
+    band = bands(covariance).astype(np.float32)
     if part_um is None:
         return TipUncertainty(None, band, {})
     radius = part_um * MM_PER_UM
@@ -206,18 +204,13 @@ def _uncertainty(
     return TipUncertainty(radius, band, beyond)
 
 
-def _part_tolerance_um(run: JointRun, runs: Runs | None) -> float | None:
-    stated = None if runs is None else runs.part_tolerance_um
-    return run.job.part_tolerance_um if stated is None else stated
-
-
 def _with_runs(
-    run: JointRun, path: JointPath, samples: Samples, origin: Array, files: Sequence[Points], runs: Runs,
+    part_um: float | None, path: JointPath, samples: Samples, origin: Array, files: Sequence[Points],
     shown: tuple[Judgements, dict[str, Any]],
 ) -> tuple[tuple[Matched, ...], Judgements, dict[str, Any]]:  # fmt: skip
     """Measured runs among the samples, and the table and the report with them."""
     table, report = shown
-    ground, how = ground_of(path), How(part_tolerance_um=_part_tolerance_um(run, runs))
+    ground, how = ground_of(path), How(part_tolerance_um=part_um)
     done = judged(ground, files, how)
     refuse_unplaced(files, done.placed, how.reach_mm)
     matcher = Matcher(ground, samples, lambda points, _: points - origin)
@@ -341,11 +334,15 @@ def _figures(done: ProvedJoints) -> dict[str, Figures]:
 
 
 def _verdict(done: ProvedJoints) -> dict[str, Any]:
-    """What the report says, as the answer to the question of the program."""
-    ok = done.proof.holds if done.proof.judged.any() else None
-    sentence = verdict_of(done.report).replace("\n", " ")
+    """What the report says, as answers to the questions of the program and of the part."""
+    holds = done.proof.holds if done.proof.judged.any() else None
+    part, sentences = done.report.get("part"), verdict_of(done.report).split("\n")
+    about = [question("program", holds, " ".join(sentences[:2]))]
+    if part is not None:
+        about.append(question("part", part_answer(part), part["sentence"]))
     return {
-        "ok": ok, "part": None, "questions": [question("program", ok, sentence)], "sentences": [sentence]
+        "ok": every(one["ok"] for one in about), "part": part, "questions": about,
+        "sentences": [one["sentence"] for one in about],
     }  # fmt: skip
 
 

@@ -13,16 +13,22 @@ from olp.calibration.joints.unknowns import Model
 from olp.core.arrays import Array
 from olp.core.values import dataclass
 from olp.kinematics.errors import Payload
-from olp.uncertainty.spread import COVERAGE
+from olp.uncertainty.probability import within
+from olp.uncertainty.spread import COVERAGE, DRAWS, FEWEST_DRAWS, SEED, WORK
+
+#: Tips that are drawn at a time, so that memory is small.
+_BLOCK = 512
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseSpread:
     """(n, 3, 3) covariances in workpiece coordinates: of tips in mm2, and of turns of the tool in rad2; of a
-    tool that is the same all round without its turn about itself."""
+    tool that is the same all round without its turn about itself. `shifts` (n, 3, k) are mm of tips by
+    independent unknowns of size 1, which all poses share."""
 
     tip: Array
     turn: Array
+    shifts: Array
 
     @property
     def turn_band_rad(self) -> Array:
@@ -47,7 +53,33 @@ def pose_spread(model: Model, axes: Array, tool_mm: Array, payload: Payload) -> 
     if model.structure.symmetric_tool:
         along = model.machine(none, payload).actual(axes).rotation[:, :, 2]
         turn -= along[:, :, None] * np.einsum("ni,nik->nk", along, turn)[:, None, :]
-    return PoseSpread(*(_covariances(table @ model.root) for table in (rest, turn)))
+    shifts = rest @ model.root
+    return PoseSpread(_covariances(shifts), _covariances(turn @ model.root), shifts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseChances:
+    """Probabilities that tips are within a distance of where they should be: (n,) of `each`, and of
+    the whole `program` by so many `draws` of the calibration."""
+
+    each: Array
+    program: float
+    draws: int
+
+    def report(self) -> dict[str, float]:
+        return {"program": self.program, "least": float(self.each.min()), "mean": float(self.each.mean())}
+
+
+def chances_of(spread: PoseSpread, off_mm: Array, limit_mm: float) -> PoseChances:
+    """The probabilities of tips that are `off_mm` (n, 3) by the calibration."""
+    draws = int(np.clip(WORK / max(len(off_mm), 1), FEWEST_DRAWS, DRAWS))
+    drawn = np.random.default_rng(SEED).normal(size=(spread.shifts.shape[2], draws))
+    inside = np.ones(draws, bool)
+    for a in range(0, len(off_mm), _BLOCK):
+        part = slice(a, a + _BLOCK)
+        off = off_mm[part, :, None] + spread.shifts[part] @ drawn
+        inside &= ((off * off).sum(axis=1) <= limit_mm**2).all(axis=0)
+    return PoseChances(within(spread.tip, off_mm, limit_mm), float(inside.mean()), draws)
 
 
 def _covariances(table: Array) -> Array:

@@ -52,15 +52,15 @@ def _options(task: Task) -> JointOptions:
 def _row(result: JointCorrection | JointVerification) -> Mapping[str, Any]:
     """The row of a summary, as of other machines: figures of the report, none of its own."""
     stated = result.report
-    deviation = stated["deviation"]
+    deviation, part = stated["deviation"], stated.get("part")
     return {
         **heading(stated),
         "uncorrected_um": deviation["before"]["position_max_um"],
         "corrected_um": deviation["after"]["position_max_um"],
         "allowed_um": deviation["allowed_um"],
         "holds": deviation["holds"],
-        "part_tolerance_um": None,
-        "part_ok": None,
+        "part_tolerance_um": None if part is None else part["tolerance_um"],
+        "part_ok": None if part is None else part["holds"],
         "ok": stated["verdict"]["ok"],
         "sentences": [],
         "findings": counts(result.findings),

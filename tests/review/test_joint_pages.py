@@ -255,7 +255,11 @@ def test_measured_runs_are_shown_where_they_were_measured(tmp_path: Path) -> Non
     (tmp_path / "run.csv").write_text("# frame=workpiece\nx_mm,y_mm,z_mm\n" + rows)
     page = olp.view_joints(text, machine, measured=[tmp_path / "run.csv"], part_tolerance_um=5.0, time=False)
     verdict = page.scene.report["verdict"]
-    assert {one["name"]: one["ok"] for one in verdict["questions"]} == {"program": True, "measured": False}
+    assert {one["name"]: one["ok"] for one in verdict["questions"]} == {
+        "program": True,
+        "part": True,
+        "measured": False,
+    }
     assert verdict["ok"] is False
     (shown,) = page.scene.measured
     origin = np.array(page.scene.frame.origin_mm)

@@ -78,9 +78,9 @@ def test_a_batch_takes_machines_of_all_kinds(tmp_path: Path) -> None:
     paged = run("batch", str(tmp_path / "arm"), "-o", str(tmp_path / "c"), "--pages", "--workers", "1")
     assert paged.exit_code == 0, paged.stderr
     assert b"deburr.csv" in (tmp_path / "c" / "deburr.csv.review.html").read_bytes()
-    options = CorrectOptions(part_tolerance_um=5.0)
+    options = CorrectOptions(only_sure_components=True)
     other = olp.batch([tmp_path / "arm"], output=tmp_path / "b", options=options, workers=1)
-    assert other.exit_code == 2 and "--part-tolerance-um" in other.report["programs"][0]["message"]
+    assert other.exit_code == 2 and "--only-sure-components" in other.report["programs"][0]["message"]
 
 
 @pytest.mark.slow

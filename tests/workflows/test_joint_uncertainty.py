@@ -4,14 +4,17 @@ from a calibration file of its own."""
 from __future__ import annotations
 
 import datetime
+import json
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import olp
 from olp.calibration.joints.unknowns import Unknown
+from olp.cli import main
 from olp.core.errors import ConfigError
 from olp.files.kinematics.covariance import JointCovariance, joint_covariance_bytes, lines_of
 
@@ -73,9 +76,8 @@ def _folder(parent: Path) -> Path:
     return parent / "bare"
 
 
-def drawn_spread(known: tuple[Path, np.ndarray, np.ndarray], folder: Path) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) mm and rad: standard deviations in the worst direction of tips, and of tool directions, of drawn
-    machines, each moved as one onto the first."""
+def drawn_machines(known: tuple[Path, np.ndarray, np.ndarray], folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """(draws, n, 3) tips in mm and tool directions of drawn machines, each moved as one onto the mean."""
     _, numbers, covariance = known
     values = np.loadtxt(LIST.splitlines()[2:], delimiter=",")
     rng, tips, tools = np.random.default_rng(2), [], []
@@ -91,7 +93,7 @@ def drawn_spread(known: tuple[Path, np.ndarray, np.ndarray], folder: Path) -> tu
         u, _, vt = np.linalg.svd(a.T @ b)
         turn = vt.T @ u.T
         tips[k], tools[k] = a @ turn.T, tools[k] @ turn.T
-    return _worst(np.array(tips)), _worst(np.array(tools))
+    return np.array(tips), np.array(tools)
 
 
 def _worst(drawn: np.ndarray) -> np.ndarray:
@@ -106,7 +108,8 @@ def test_what_is_stated_is_what_drawn_machines_do(
 ) -> None:
     report = olp.correct_joints(LIST.encode(), known[0]).report
     stated = report["uncertainty"]
-    tip, turn = drawn_spread(known, tmp_path)
+    drawn, tools = drawn_machines(known, tmp_path)
+    tip, turn = _worst(drawn), _worst(tools)
     assert stated["waypoints"] == 5 and stated["growth_by_age"] == 1.0
     assert {row["line"] for row in stated["lines"]} == {3, 4, 5, 6, 7}
     by_line = sorted(stated["lines"], key=lambda row: row["line"])
@@ -115,6 +118,12 @@ def test_what_is_stated_is_what_drawn_machines_do(
     mean = np.mean([row["band_um"] for row in by_line] / (2e3 * tip))
     assert mean == pytest.approx(1.0, abs=0.1)
     assert stated["expected"]["after_rms_um"] > report["deviation"]["after"]["position_rms_um"]
+    far_um = 1e3 * np.sort(np.linalg.norm(drawn - drawn.mean(axis=0), axis=2).max(axis=1))
+    for share in (0.3, 0.8):
+        radius = float(np.quantile(far_um, share))
+        judged = olp.correct_joints(LIST.encode(), known[0], part_tolerance_um=radius)
+        assert judged.report["part"]["probability"] == pytest.approx(share, abs=0.08)
+        assert "OLP433" in [one.code for one in judged.findings] and judged.report["verdict"]["ok"] is None
     text = olp.correct_joints(LIST.encode(), known[0]).to_text()
     assert "Uncertainty of the poses, from the calibration" in text and "c.npz, at 5 waypoints" in text
 
@@ -129,6 +138,33 @@ def test_it_grows_with_age_and_without_covariance_nothing_is_said(
     assert later["band_um"]["max_um"] == pytest.approx(now["band_um"]["max_um"] * 2.0, rel=1e-3)
     bare = olp.correct_joints(LIST.encode(), machine_of(tmp_path, known[1]))
     assert "uncertainty" not in bare.report and "Uncertainty" not in bare.to_text()
+
+
+def test_a_part_is_judged_and_runs_are_beside_what_is_known(
+    known: tuple[Path, np.ndarray, np.ndarray], tmp_path: Path
+) -> None:
+    """The tolerance of the job counts, too; a comparison states the bands of the correction."""
+    (tmp_path / "job.toml").write_text('schema = "olp-job-1"\npart_tolerance_um = 0.5\n')
+    done = olp.correct_joints(LIST.encode(), known[0], tmp_path / "job.toml")
+    assert "OLP108" in [one.code for one in done.findings] and done.report["verdict"]["ok"] is False
+    assert "ABOVE the part tolerance of 0.5 um" in done.to_text()
+    wide = olp.check_joints(LIST.encode(), known[0], part_tolerance_um=500.0)
+    assert wide.report["verdict"]["ok"] and "Within the part tolerance of 500 um" in wide.to_text()
+    nominal, run = tmp_path / "nominal.csv", tmp_path / "run.csv"
+    nominal.write_text(LIST)
+    poses = olp.load_kinematics(known[0]).nominal(np.loadtxt(LIST.splitlines()[2:], delimiter=","))
+    band_um = done.report["uncertainty"]["band_um"]
+    for far_um, share in ((0.0, 1.0), (1.1 * band_um["max_um"], 0.0)):
+        np.savetxt(
+            run,
+            poses.position + np.array((0.0, 0.0, far_um / 1e3)),
+            delimiter=",",
+            header="X_mm,Y_mm,Z_mm",
+            comments="",
+        )
+        told = CliRunner().invoke(main, ["compare", *map(str, (nominal, run, "-m", known[0], "--json"))])
+        part = json.loads(told.stdout)["uncertainty"]
+        assert part["measured_within"] == share and part["band_um"] == pytest.approx(band_um)
 
 
 @pytest.mark.slow

@@ -29,8 +29,8 @@ from olp.workflows.shown import Shown
 
 #: What is looked for on such a machine, in the order of codes.
 CODES = (
-    "OLP101", "OLP102", "OLP103", "OLP105", "OLP106", "OLP107", "OLP111", "OLP311", "OLP312", "OLP331",
-    "OLP332", "OLP401", "OLP402", "OLP403", "OLP405", "OLP408", "OLP422",
+    "OLP101", "OLP102", "OLP103", "OLP105", "OLP106", "OLP107", "OLP108", "OLP111", "OLP311", "OLP312",
+    "OLP331", "OLP332", "OLP401", "OLP402", "OLP403", "OLP405", "OLP408", "OLP422", "OLP433",
 )  # fmt: skip
 
 
@@ -70,6 +70,7 @@ def check_joints(
     outside_box: Outside = "refuse",
     flatten: bool = False,
     expand_cycles: bool = False,
+    part_tolerance_um: float | None = None,
     date: datetime.date | None = None,
     select: Sequence[str] = (),
     ignore: Sequence[str] = (),
@@ -80,7 +81,8 @@ def check_joints(
     `correct_joints`, and UsageError for codes that are not looked for."""
     options = JointCheckOptions(
         tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, outside_box=outside_box, flatten=flatten,
-        expand_cycles=expand_cycles, date=date, select=tuple(select), ignore=tuple(ignore),
+        expand_cycles=expand_cycles, part_tolerance_um=part_tolerance_um, date=date,
+        select=tuple(select), ignore=tuple(ignore),
     )  # fmt: skip
     run = JointRun.of(program if nominal is None else nominal, machine, job)
     result = examined(run, None if nominal is None else run.sources.source(program, nominal), options)
@@ -183,8 +185,10 @@ def _verdict(done: ProvedJoints, kept: tuple[Finding, ...], codes: list[str]) ->
     """The verdict of the proof and of the findings that are kept. What a code that is left out says does not
     count."""
     sentences = [verdict_of(done.report).replace("\n", " ")]
-    if "OLP101" not in codes and not done.proof.holds:
-        sentences.append("OLP101 is left out, so that does not count here.")
+    part = done.report.get("part")
+    for code, holds in (("OLP101", done.proof.holds), ("OLP108", part is None or part["holds"])):
+        if code not in codes and not holds:
+            sentences.append(f"{code} is left out, so that does not count here.")
     return {"ok": not any(f.severity >= Severity.ERROR for f in kept), "sentences": sentences}
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +20,12 @@ from olp.kinematics.poses import Poses
 from olp.kinematics.programmed import stated_tips
 from olp.program.pointlist.axis_list import names_of
 from olp.proof.judgement import groups_of
+from olp.uncertainty.spread import COVERAGE
 from olp.workflows.compare import CompareOptions, Comparison, Side, compared
 from olp.workflows.compare_runs import Ground
 from olp.workflows.joints.along import Along
 from olp.workflows.joints.loaded import JointRun
+from olp.workflows.joints.uncertain import NOT_INCLUDED, figures, known_of
 from olp.workflows.session import PathLike
 
 #: How files name the coordinates of the workpiece with all axes at zero, as `simulate` states them.
@@ -35,6 +39,7 @@ def compare_with(run: JointRun, measured: Sequence[PathLike], options: CompareOp
     UsageError and CannotCompute."""
     if not measured:
         raise UsageError("no measured file is given; name at least one")
+    options = replace(options, part_tolerance_um=run.part_tolerance_um(options.part_tolerance_um))
     with run.program.errors():
         _, path = run.read(run.program, options)
     sets = [
@@ -47,7 +52,38 @@ def compare_with(run: JointRun, measured: Sequence[PathLike], options: CompareOp
         None if options.poses else ground_of(path), run.heads(), run.machine.structure.symmetric_tool,
     )  # fmt: skip
     done = compared(side, sets, options)
-    return replace(done, inputs=(*run.files, *run.sources.files))
+    known = _uncertainty(run, path, done, options.date)
+    report = done.report if known is None else done.report | {"uncertainty": known}
+    return replace(done, report=report, inputs=(*run.files, *run.sources.files))
+
+
+def _uncertainty(
+    run: JointRun, path: JointPath, done: Comparison, date: datetime.date | None
+) -> dict[str, Any] | None:
+    """How well the calibration knows the tips of what is compared, and how many of the measured points are
+    within that; None where it states no covariance."""
+    known, rows = known_of(run, date), _known(path)
+    rows = rows if done.path is None else rows[path.judged[rows]]
+    if known is None or not len(rows):
+        return None
+    line, tip, turn = known.bands_um_urad(run, path, rows)
+    result = {
+        "coverage_factor": COVERAGE,
+        "source": known.source,
+        "growth_by_age": known.growth,
+        "band_um": figures(tip, "um"),
+        "band_urad": figures(turn, "urad"),
+        "not_included": list(NOT_INCLUDED),
+    }
+    if done.path is None or not done.counted.any():
+        return result
+    lines = np.unique(line)
+    band = np.zeros(len(lines))
+    np.maximum.at(band, np.searchsorted(lines, line), tip)
+    counted = done.counted & np.isin(done.line, lines)
+    own = band[np.searchsorted(lines, done.line[counted])]
+    share = float(np.mean(done.deviation_um[counted] <= own)) if counted.any() else None
+    return result | {"measured_within": share}
 
 
 def _known(path: JointPath) -> Index:

@@ -30,8 +30,9 @@ from olp.program.robots.dialect import RobotDialect
 from olp.program.text.numbers import spliced
 from olp.proof.joints import JointProof, prove_joints
 from olp.workflows import real_time
-from olp.workflows.flatten import UnrollOptions
+from olp.workflows.flatten import UnrollOptions, above_zero
 from olp.workflows.joints.loaded import JointRun
+from olp.workflows.joints.part import judge_part
 from olp.workflows.joints.report import findings_of, last_digits, outside_box, report_of
 from olp.workflows.joints.uncertain import uncertainty_of
 from olp.workflows.original import placed, placed_findings
@@ -42,14 +43,19 @@ from olp.workflows.shown import Shown
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointOptions(UnrollOptions):
     """The options of verbs that prove a correction on a machine with rotary joints: the numerical tolerances
-    of position and orientation, and the day of the run. With `times` a correction states how long both
+    of position and orientation, the part tolerance (`part_tolerance_um`, default: the job's), and the day of
+    the run. With `times` a correction states how long both
     programs take."""
 
     tolerance_um: float = 1.0
     tolerance_urad: float = 10.0
     outside_box: Outside = "refuse"
+    part_tolerance_um: float | None = None
     date: datetime.date | None = None
     times: bool = False
+
+    def __post_init__(self) -> None:
+        above_zero(self, "tolerance_um", "tolerance_urad", "part_tolerance_um")
 
     def limits(self) -> JointLimits:
         return JointLimits(self.tolerance_um * MM_PER_UM, self.tolerance_urad * RAD_PER_URAD)
@@ -109,6 +115,7 @@ def correct_joints(
     flatten: bool = False,
     expand_cycles: bool = False,
     outside_box: Literal["refuse", "hold"] = "refuse",
+    part_tolerance_um: float | None = None,
     date: datetime.date | None = None,
     times: bool = False,
 ) -> JointCorrection:
@@ -117,12 +124,13 @@ def correct_joints(
 
     The corrected text is in the program's own dialect; only coordinate words differ, and words, blocks and
     rows are inserted. Moves are split where the tip or the tool would leave its tolerance, in um and urad.
-    With `times` the report states how long both programs take, as `retime_joints` plans them.
+    With `part_tolerance_um` (default: the job's) the report says whether the part is good, as far as the
+    calibration knows. With `times` it states how long both programs take, as `retime_joints` plans them.
     Raises InputError (ProgramError with its line, ConfigError) and CannotCompute.
     """
     options = JointOptions(
         tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, flatten=flatten,
-        expand_cycles=expand_cycles, outside_box=outside_box, date=date,
+        expand_cycles=expand_cycles, outside_box=outside_box, part_tolerance_um=part_tolerance_um, date=date,
         times=times,
     )  # fmt: skip
     return corrected(JointRun.of(program, machine, job), options)
@@ -190,9 +198,14 @@ def proved(
     text = bytes(corrected.program.data)
     report = report_of(run, path, plan, proof, findings, tolerance)
     report["worst"] = [placed(row, origin) for row in report["worst"]]
-    known = uncertainty_of(run, path, proof, options.date)
+    part_um = run.part_tolerance_um(options.part_tolerance_um)
+    known = uncertainty_of(run, (path, corrected), proof, options.date, part_um)
     if known is not None:
         report["uncertainty"] = known
+    if part_um is not None and proof.judged.any():
+        more = judge_part(report, path, proof, part_um)
+        findings = (*findings, *placed_findings(more, origin))
+        report["findings"] = [one.as_dict() for one in findings]
     report["corrected"] = {"sha256": hashlib.sha256(text).hexdigest(), "lines": text.count(b"\n")}
     if tally is not None:
         report["written"] = {

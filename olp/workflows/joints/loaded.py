@@ -105,6 +105,10 @@ class JointRun:
             described, loaded, stated, setup, turned, digest, sources, source, (*sources.files, *files)
         )
 
+    def part_tolerance_um(self, given: float | None) -> float | None:
+        """The tolerance of the part: as given, else the job's."""
+        return self.job.part_tolerance_um if given is None else given
+
     def dialect(self, source: Source) -> Dialect:
         """The dialect of a program on this machine. Raises ProgramError where it is not one that is read."""
         if self.machine.arm is not None and not _names_axes(source.data, self.machine):

@@ -45,13 +45,14 @@ def verify_joints(
     tolerance_urad: float = 10.0,
     flatten: bool = False,
     expand_cycles: bool = False,
+    part_tolerance_um: float | None = None,
     date: datetime.date | None = None,
 ) -> JointVerification:
     """Prove a corrected program from the nominal and the corrected text alone. Raises as `correct_joints`,
     and ProgramError where the second is not a correction of the first."""
     options = JointOptions(
         tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, flatten=flatten,
-        expand_cycles=expand_cycles, date=date,
+        expand_cycles=expand_cycles, part_tolerance_um=part_tolerance_um, date=date,
     )  # fmt: skip
     run = JointRun.of(nominal, machine, job)
     return verified(run, run.sources.source(corrected, nominal), options)
