@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from click.testing import CliRunner
-from judge.located import Array, Located, Name, errors_of, limit, slopes, turned, vector_of, without_frame
+from judge.located import Array, Located, Name, best_of, errors_of, slopes, turned, vector_of, without_frame
 from scipy.spatial.transform import Rotation
 
 import olp
@@ -52,8 +52,9 @@ JUDGED = 60
 @dataclass(frozen=True)
 class Run:
     """Readings of one set-up: the commanded values (n, k), what is read as a function of errors and own
-    unknowns (l,), how well in mm or rad (m,), and their table and file. `shown` (n, k) is what the control
-    showed, where the file has columns of it."""
+    unknowns (l,), how well in mm or rad (m,), their table and file. `missed` (n, m) is what was read
+    less what the true errors predict, in mm or rad. `shown` (n, k) is what the control showed, where the file
+    has columns of it."""
 
     values: Array
     predict: Callable[[dict[Name, float], Array], Array]
@@ -62,16 +63,19 @@ class Run:
     table: str
     columns: tuple[str, ...]
     read: Array
+    missed: Array
     which: tuple[str, Sequence[str]] | None
     shown: Array | None = None
 
 
 @dataclass(frozen=True)
 class Score:
-    """How far the tip is off at other postures in the best frame, and the limit, rms in um; and of
-    how many components (2 sigma) the stated uncertainty covers."""
+    """How far the tip is off at other postures in the best frame, rms in um; how far it is from where the
+    best estimate from the same readings has it; and how far off that is on average, the limit. Of how many
+    components (2 sigma) the stated uncertainty covers."""
 
     off_um: float
+    beside_um: float
     limit_um: float
     stated_um: float
     covered: float
@@ -204,12 +208,11 @@ class Campaign:
 
         more = f"payload_kg = {payload[0]}\npayload_centre_mm = {payload[1].tolist()}\n" if payload else ""
         more += "[points.nests_mm]\n" + "".join(f"N{k} = {nest.tolist()}\n" for k, nest in enumerate(NESTS))
-        read = predict(self.errors(self.theta), np.zeros(6)) + self.noise(len(values), 3)
+        noise = self.noise(len(values), 3)
+        read = predict(self.errors(self.theta), np.zeros(6)) + noise
         columns = tuple(f"measured_{c}_mm" for c in "XYZ")
-        named = ("nest", [f"N{k}" for k in which])
-        return Run(
-            values, predict, 6, np.full(3, self.sigma), self.head("points", file, more), columns, read, named
-        )
+        named, table = ("nest", [f"N{k}" for k in which]), self.head("points", file, more)
+        return Run(values, predict, 6, np.full(3, self.sigma), table, columns, read, noise, named)
 
     def _six(self, values: Array) -> Run:
         turn, shift = turned(np.array((0.3, 1.0, -2.0))), np.array((3000.0, -500.0, 200.0))
@@ -226,13 +229,16 @@ class Campaign:
             away = vector_of(turned(own[3:]) @ turn @ whole[:, :3, :3] @ np.swapaxes(real, -1, -2))
             return np.concatenate((at, away), 1)
 
-        at = predict(self.errors(self.theta), np.zeros(6))[:, :3] + self.noise(count, 3)
-        slips = turned(self.rng.normal(0.0, 1e-6 * TURN_URAD, (count, 3))) @ real
+        noise = self.noise(count, 3)
+        at = predict(self.errors(self.theta), np.zeros(6))[:, :3] + noise
+        slip = self.rng.normal(0.0, 1e-6 * TURN_URAD, (count, 3))
+        slips = turned(slip) @ real
         angles = Rotation.from_matrix(slips).as_euler("xyz", degrees=True)
         columns = tuple(f"measured_{c}_mm" for c in "XYZ") + tuple(f"measured_{c}_deg" for c in "ABC")
         sigma = np.array([self.sigma] * 3 + [1e-6 * TURN_URAD] * 3)
         table = self.head("poses", "poses.csv", f"sigma_urad = {TURN_URAD}\n")
-        return Run(values, predict, 6, sigma, table, columns, np.concatenate((at, angles), 1), None)
+        read, missed = np.concatenate((at, angles), 1), np.concatenate((noise, slip), 1)
+        return Run(values, predict, 6, sigma, table, columns, read, missed, None)
 
     def _lengths(self, values: Array) -> Run:
         middle = self.tips(values, {}, self.tool).mean(axis=0)
@@ -243,12 +249,13 @@ class Campaign:
             away = self.tips(values, errors, self.tool) - (centres + own.reshape(3, 3))[which]
             return np.asarray(np.linalg.norm(away, axis=1))[:, None]
 
-        read = predict(self.errors(self.theta), np.zeros(9)) + self.noise(len(values), 1)
+        noise = self.noise(len(values), 1)
+        read = predict(self.errors(self.theta), np.zeros(9)) + noise
         about = centres + self.rng.uniform(-1.0, 1.0, (3, 3))
         more = "[lengths.centres_mm]\n" + "".join(f"S{k} = {c.tolist()}\n" for k, c in enumerate(about))
         named = ("centre", [f"S{k}" for k in which])
         table = self.head("lengths", "lengths.csv", more)
-        return Run(values, predict, 9, np.array([self.sigma]), table, ("length_mm",), read, named)
+        return Run(values, predict, 9, np.array([self.sigma]), table, ("length_mm",), read, noise, named)
 
     def _planes(self, values: Array, count: int) -> Run:
         true, which = self.errors(self.theta), np.arange(len(values)) % 3
@@ -268,8 +275,13 @@ class Campaign:
         )
         met, rows = met[:count], rows[:count]
         named = ("plane", [f"P{k}" for k in which[rows]])
-        return Run(met, lambda errors, own: away(met, which[rows], errors, own), 9, np.array([self.sigma]),
-                   self.head("planes", "planes.csv"), (), np.zeros((len(met), 0)), named)  # fmt: skip
+
+        def predict(errors: dict[Name, float], own: Array) -> Array:
+            return away(met, which[rows], errors, own)
+
+        sigma, table = np.array([self.sigma]), self.head("planes", "planes.csv")
+        missed = -predict(true, np.zeros(9))
+        return Run(met, predict, 9, sigma, table, (), np.zeros((len(met), 0)), missed, named)
 
     def _balls(self, values: Array, count: int, balls: int, by_hand: bool) -> Run:
         middle = self.tips(values, {}, self.tool).mean(axis=0)
@@ -291,15 +303,17 @@ class Campaign:
         own = 3 * balls
         if by_hand:
             table, columns, read = self.head("postures", "point.csv"), (), np.zeros((len(met), 0))
+            missed = -predict(true, np.zeros(own))
         else:
             table = self.head("ball", "ball.csv", 'reads = "tip"\naxes = "workpiece"\n')
             columns = ("dX_um", "dY_um", "dZ_um")
             # the probe is set to zero somewhere near the ball
             zero = self.rng.uniform(-0.05, 0.05, 3 * balls)
             read = 1e3 * (predict(true, zero) + noise[rows])
+            missed = 1e-3 * read - predict(true, np.zeros(own))
         name = "point" if by_hand else "ball"
         named = (name, [f"B{k}" for k in which[rows]])
-        return Run(met, predict, own, np.full(3, self.sigma), table, columns, read, named)
+        return Run(met, predict, own, np.full(3, self.sigma), table, columns, read, missed, named)
 
     def written(self) -> Path:
         """The plan with its files."""
@@ -330,8 +344,9 @@ class Campaign:
         plan.write_text("\n".join([head, *tables]))
         return plan
 
-    def least(self) -> Array:
-        """(k, k) the least covariance of the parameters from these readings."""
+    def best(self) -> tuple[Array, Array]:
+        """By how much the best estimate of the parameters is off (k,), and the least covariance (k, k). It
+        knows the spread of such machines, and how the readings depend on the errors there are."""
         rows, owns = [], []
         width = sum(run.own for run in self.runs)
         before = 0
@@ -349,7 +364,8 @@ class Campaign:
             whole[:, before : before + run.own] = own
             owns.append(whole)
             before += run.own
-        return limit(np.concatenate(rows), np.concatenate(owns), self.spread)
+        missed = np.concatenate([(run.missed / run.sigma).ravel() for run in self.runs])
+        return best_of(np.concatenate(rows), np.concatenate(owns), self.spread, missed, self.theta)
 
     def judged(self) -> tuple[Array, Array, Any]:
         """Other postures, a longer tool, and what it holds."""
@@ -380,11 +396,10 @@ class Campaign:
 
         table = slopes(tip, self.theta, 0.01 * self.spread).reshape(JUDGED, 3, -1)
         table = without_frame(table, true)
-        least = np.einsum("nik,kl,nil->ni", table, self.least(), table)
-        return Score(
-            1e3 * float(np.sqrt(np.mean(off**2))), 1e3 * float(np.sqrt(np.mean(least))),
-            1e3 * float(np.sqrt(np.mean(stated**2))), float(np.sum(np.abs(off) < 2.0 * stated)), off.size,
-        )  # fmt: skip
+        change, covariance = self.best()
+        least = np.sqrt(np.einsum("nik,kl,nil->ni", table, covariance, table))
+        sizes = (1e3 * float(np.sqrt(np.mean(one**2))) for one in (off, off - table @ change, least, stated))
+        return Score(*sizes, float(np.sum(np.abs(off) < 2.0 * stated)), off.size)
 
 
 def laid(points: Array, on: Array) -> Array:

@@ -241,15 +241,19 @@ def slopes(of: Callable[[Array], Array], at: Array, step: Array) -> Array:
     return np.stack(columns, 1)
 
 
-def limit(rows: Array, own: Array, spread: Array) -> Array:
-    """(k, k) the least covariance of parameters with a spread (k,) before readings whose slopes are `rows`
-    (m, k) and, for unknowns of the instruments, `own` (m, l), both over their noise."""
+def best_of(rows: Array, own: Array, spread: Array, missed: Array, true: Array) -> tuple[Array, Array]:
+    """By how much the best estimate (k,) of parameters is off, and the least covariance (k, k) of it.
+
+    They have a spread (k,) before the readings, whose slopes are `rows` (m, k) and, for unknowns of the
+    instruments, `own` (m, l); `missed` (m,) is their noise. All three are over the expected noise. `true`
+    (k,) are the parameters."""
     free = np.linalg.svd(own, full_matrices=False) if own.size else None
     if free is not None:
         basis = free[0][:, free[1] > 1e-9 * free[1][0]]
-        rows = rows - basis @ (basis.T @ rows)
+        rows, missed = (one - basis @ (basis.T @ one) for one in (rows, missed))
     scaled = rows * spread
-    return np.linalg.inv(scaled.T @ scaled + np.eye(len(spread))) * np.outer(spread, spread)
+    least = np.linalg.inv(scaled.T @ scaled + np.eye(len(spread)))
+    return spread * (least @ (scaled.T @ missed - true / spread)), least * np.outer(spread, spread)
 
 
 def without_frame(table: Array, place: Array) -> Array:

@@ -104,7 +104,8 @@ def test_stated_uncertainty_is_the_information_limit(structure: str, instrument:
     kept. Of the limit the judge knows the size of these errors, and the fit the noise."""
     score = Campaign(tmp_path / structure, structure, instrument, 0).score()
     assert 0.93 < score.stated_um / score.limit_um < 1.15
-    assert score.off_um < 3.0 * score.limit_um
+    # and on average the tip is off by the limit and by what parts the fit from the best one
+    assert np.hypot(score.limit_um, score.beside_um) < 1.15 * score.limit_um
 
 
 def test_a_few_campaigns_are_as_good_as_stated() -> None:
