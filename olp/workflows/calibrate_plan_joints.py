@@ -10,9 +10,10 @@ import numpy as np
 from olp.calibration.design.choosing import Criterion
 from olp.calibration.joints.candidates import Priors
 from olp.calibration.joints.poses import Postures
+from olp.calibration.joints.random_postures import random_postures
 from olp.calibration.joints.unknowns import model_of
 from olp.core.arrays import Array
-from olp.core.errors import ConfigError, UsageError
+from olp.core.errors import UsageError
 from olp.core.machine import Vector
 from olp.core.units import MM_PER_UM, UM_PER_MM
 from olp.core.values import dataclass
@@ -70,10 +71,11 @@ def plan_poses(
 
     `reflector_mm` is the vector from the gauge point to the reflector, `sigma_um` the uncertainty of a
     coordinate. `among` is a list of postures that the machine can take. Without it they are random ones
-    within the travel of all axes. Raises InputError, ConfigError, UsageError, CannotCompute.
+    within the travel of all axes; of a platform those of random poses. Raises InputError, ConfigError,
+    UsageError, CannotCompute.
     """
     structure = load_joint_machine(machine).structure
-    values = _random(structure) if among is None else _listed(among, structure)
+    values = random_postures(structure, CANDIDATES, SEED) if among is None else _listed(among, structure)
     model = model_of(structure, values, Priors.of(structure))
     if count > len(values):
         raise UsageError(f"there are {len(values)} postures to choose {count} from; ask for fewer")
@@ -94,16 +96,6 @@ def plan_poses(
     }
     files = (str(machine), *(() if among is None else (str(among),)))
     return PlannedPoses(structure, values[choice.index], report, inputs=files)
-
-
-def _random(structure: Structure) -> Array:
-    """Postures within the travel of all axes. Raises ConfigError for legs, whose lengths fit one another."""
-    if structure.platforms:
-        raise ConfigError(
-            "not every set of lengths of legs is a posture; give a list of postures of the machine (--among)"
-        )
-    low, high = np.array([joint.travel for joint in structure.joints.values()]).T
-    return np.random.default_rng(SEED).uniform(low, high, (CANDIDATES, len(low)))
 
 
 def _listed(file: PathLike, structure: Structure) -> Array:

@@ -10,9 +10,13 @@ import pytest
 from calibration.joints.simulated import SIGMA, TOOL, read, true_machine
 from cli.test_cli import run
 
+import olp
 from olp.calibration.joints.adjustment import fit_joints
 from olp.calibration.joints.poses import Postures
+from olp.calibration.joints.random_postures import random_postures
 from olp.core.errors import ConfigError
+from olp.kinematics.chain import Kinematics
+from olp.kinematics.errors import LegErrors, MachineErrors
 from olp.workflows.calibrate_plan_joints import plan_poses
 
 FOLDER = Path(__file__).resolve().parents[3] / "programs"
@@ -76,5 +80,40 @@ def test_the_verb_writes_a_program_of_postures(tmp_path: Path) -> None:
     plate = str(FOLDER / "gantry-plate" / "machine.toml")
     done = run("calibrate", "plan", "-m", plate, "--next", "5", "--among", str(out))
     assert done.exit_code == 2 and "--among is for machines with rotary joints" in done.stderr
-    with pytest.raises(ConfigError, match="not every set of lengths of legs is a posture"):
-        plan_poses(FOLDER / "hexapod" / "machine.toml", 5)
+
+
+@pytest.mark.parametrize(
+    ("name", "most_mm"),
+    [
+        ("tripod", 1.0),
+        ("linear-delta", 5.0),
+        pytest.param("hexapod", 5.0, marks=pytest.mark.slow),
+        pytest.param("rotary-delta", 100.0, marks=pytest.mark.slow),
+    ],
+)
+def test_random_postures_of_a_platform_are_poses_that_it_reaches(
+    name: str, most_mm: float, tmp_path: Path
+) -> None:
+    """They fill the travel, and legs that are a little off hold the platform there."""
+    assert run("init", str(tmp_path), "--structure", name).exit_code == 0
+    machine = olp.load_kinematics(tmp_path / "machine.toml")
+    values, structure = random_postures(machine.structure, 200, 5), machine.structure
+    ends = np.array([joint.travel for joint in structure.joints.values()]).T
+    assert len(values) > 150
+    assert (values >= ends[0]).all() and (values <= ends[1]).all()
+    assert (np.ptp(values, axis=0) > 0.4 * (ends[1] - ends[0])).all()
+    (platform,) = structure.platforms.values()
+    off = {(platform.name, k): LegErrors(length_mm=0.1 * (-1) ** k) for k in range(len(platform.legs))}
+    there = Kinematics(structure, MachineErrors(legs=off)).actual(values).position
+    assert np.linalg.norm(there - machine.nominal(values).position, axis=1).max() < most_mm
+
+
+def test_a_platform_that_is_carried_asks_for_a_list_of_postures(tmp_path: Path) -> None:
+    assert run("init", str(tmp_path), "--structure", "tripod").exit_code == 0
+    text = (tmp_path / "machine.toml").read_text()
+    text = text.replace('chain = "F P"', 'chain = "F X P"').replace('program_words = "pose"', "")
+    (tmp_path / "machine.toml").write_text(
+        text + "\n[axes.X]\ntravel_mm = [0.0, 9.0]\nleast_increment_mm = 0.001\n"
+    )
+    with pytest.raises(ConfigError, match="further axes carry the platform"):
+        plan_poses(tmp_path / "machine.toml", 5)
