@@ -37,16 +37,17 @@ def posed(
     posture is not stated or singular, and for `endless` axes that are not rotary."""
     serial = family_of(structure) is not None
     if not serial or not poses:
-        if posture is not None or endless:
-            name = "endless" if posture is None else "posture"
-            raise _wrong(
-                f'kinematics.{name} is read with program_words = "pose", on serial axes; leave it out'
-            )
         if poses and not states_poses(structure):
             raise _wrong(
                 'kinematics.program_words = "pose" is read where one platform carries the tool, and on '
                 "SCARA, polar and six-axis arms without further axes; the chain is "
-                f"{' '.join(structure.chain)}"
+                f"{' '.join(structure.chain)}. Leave it out with posture and endless, and correct lists of "
+                "axis values"
+            )
+        if posture is not None or endless:
+            name = "endless" if posture is None else "posture"
+            raise _wrong(
+                f'kinematics.{name} is read with program_words = "pose", on serial axes; leave it out'
             )
         return structure
     names = structure.order
