@@ -34,7 +34,7 @@ _GAIN = 0.003
 #: share of the time that a search in a tube has to gain to be made again from its end ...
 _AGAIN = 1e-2
 #: ... and how often it is made
-_SEARCHES = 3
+_SEARCHES = 5
 #: share of the time that jerk costs in closed form which optimising does not recover
 _JERK_COST = 0.1
 #: exceptions of a solver that fails

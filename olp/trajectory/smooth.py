@@ -21,6 +21,7 @@ import numpy as np
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
 from olp.core.values import dataclass
+from olp.trajectory.hats import hats
 from olp.trajectory.kernels import deviations, least_over
 from olp.trajectory.route import AxisLimits, Route
 
@@ -132,15 +133,16 @@ def smooth(route: Route, limits: AxisLimits) -> SmoothPath:
     rest = 1 + np.flatnonzero(route.tolerance_mm[kept[1:-1]] == 0.0)
     tolerance = _tolerance(route, kept, rest, 0.0 if len(kept) == len(route) else 2.0 * same)
     bend = np.diff(u, axis=0)
-    inner = arc_mm[1:-1]
     width = _widths(u, bend, arc_mm, rest, feed, tolerance, limits, grid)
     used = width > 0.0
-    bend, inner, width = bend[used], inner[used], width[used]
+    bend, place, width = bend[used], 1 + np.flatnonzero(used), width[used]
     # towards a rest the tolerance is that of the waypoint before
     ends = np.stack((tolerance[:-1], tolerance[1:]), axis=1)
     leave, arrive = np.append(0, rest), np.append(rest, len(arc_mm) - 1)
     ends[leave, 0], ends[arrive - 1, 1] = tolerance[leave + 1], tolerance[arrive - 1]
-    breaks, width, shape = _fitted(arc_mm, u, point, bend, inner, width, ends, grid)
+    still = np.zeros(len(arc_mm), bool)
+    still[leave] = still[-1] = True
+    breaks, width, shape = _fitted(arc_mm, u, point, bend, place, width, ends, still, grid)
     segment = np.clip(np.searchsorted(arc_mm, breaks[:-1], side="right") - 1, 0, len(u) - 1)
     at_rest = np.searchsorted(breaks, arc_mm[rest])
     return SmoothPath(breaks, shape, feed[segment], line[segment], source[segment], at_rest)
@@ -250,26 +252,36 @@ def _fitted(
     u: Array,
     point: Array,
     bend: Array,
-    inner: Array,
+    place: Index,
     width: Array,
     tolerance: Array,
+    rest: Mask,
     grid: float,
 ) -> tuple[Array, Array, Array]:
     """Breaks, widths and shapes, after every kernel over a piece beyond the tolerance is narrowed."""
+    inner = arc_mm[place]
     for turn in range(_ROUNDS):
-        breaks = np.unique(np.concatenate((arc_mm, inner - width, inner + width)))
-        begin, middle, end = (np.searchsorted(breaks, e) for e in (inner - width, inner, inner + width))
+        wide = hats(arc_mm, place, width, bend, rest)
+        lone = np.flatnonzero(~wide.sampled)
+        low, high = np.where(wide.sampled, arc_mm[wide.begin], inner - width), inner + width
+        high = np.where(wide.sampled, arc_mm[wide.end], high)
+        breaks = np.unique(np.concatenate((arc_mm, low[lone], high[lone])))
+        begin, middle, end = (np.searchsorted(breaks, e) for e in (low, inner, high))
         shape = np.empty((len(breaks) - 1, 4, u.shape[1]))
         factor = np.ones(len(width))
         for lo in range(0, len(shape), _BLOCK):
             hi = min(lo + _BLOCK, len(shape))
             x = breaks[lo : hi + 1]
-            pick = np.flatnonzero((end > lo) & (begin < hi))
-            a, m, b = (np.clip(e[pick] - lo, 0, hi - lo) for e in (begin, middle, end))
-            taylor = deviations(x, inner[pick], width[pick], bend[pick], a, m, b)
             segment = np.clip(np.searchsorted(arc_mm, x[:-1], side="right") - 1, 0, len(u) - 1)
+            taylor = wide.at(x[:-1], arc_mm, segment)
+            pick = lone[(end[lone] > lo) & (begin[lone] < hi)]
+            if pick.size:
+                parts = (np.clip(e[pick] - lo, 0, hi - lo) for e in (begin, middle, end))
+                taylor += deviations(x, inner[pick], width[pick], bend[pick], *parts)
             share = _allowed(taylor, x, arc_mm, segment, tolerance)
             if (share < 1.0).any():
+                pick = np.flatnonzero((end > lo) & (begin < hi))
+                a, b = (np.clip(e[pick] - lo, 0, hi - lo) for e in (begin, end))
                 factor[pick] = np.minimum(factor[pick], least_over(share, a, b))
             piece = shape[lo:hi]
             piece[:, 0] = point[segment] + u[segment] * (x[:-1] - arc_mm[segment])[:, None] + taylor[:, 0]

@@ -20,9 +20,9 @@ from olp.trajectory.route import AxisLimits, Route
 
 #: share of a tolerance by which a waypoint may be moved
 _SHARE = 0.6
-#: the path is made even over so much of the length that is passed in the time in which the jerk moves an axis
-#: by the tolerance
-_LENGTH = 0.5
+#: the path is made even over so many times the length that is passed in the time in which the jerk moves an
+#: axis by the tolerance: the more, the less acceleration and jerk the feed leaves
+LENGTHS = (1.0, 2.0)
 #: waypoints closer than this share of that length count as so far apart, which keeps numbers in range
 _CLOSE = 0.05
 #: waypoints in a row of which a third difference is taken
@@ -39,16 +39,16 @@ _FIXED = 1e9
 _LEAST = 1e-2
 
 
-def spread(route: Route, limits: AxisLimits) -> Route | None:
+def spread(route: Route, limits: AxisLimits, share: float = LENGTHS[0]) -> Route | None:
     """The route with waypoints moved so that it bends evenly, and the tolerance that remains; None where it
-    does already. Waypoints keep their order, and rests their place."""
+    does already. Waypoints keep their order, and rests their place. `share` is one of LENGTHS."""
     point = route.point_mm
     step = np.sqrt((np.diff(point, axis=0) ** 2).sum(axis=1))
     if len(point) <= _ROW or not (step > 0.0).all():
         return None
     rest = (route.tolerance_mm == 0.0) | (route.dwell_s > 0.0)
     rest[0] = rest[-1] = True
-    length = _lengths(route, limits, rest)
+    length = share * _lengths(route, limits, rest)
     room = np.where(rest, np.inf, _SHARE * route.tolerance_mm)
     step = np.maximum(step, _CLOSE * np.minimum(length[:-1], length[1:]))
     rough = _roughness(np.concatenate(([0.0], np.cumsum(step))))
@@ -70,11 +70,11 @@ def spread(route: Route, limits: AxisLimits) -> Route | None:
 
 
 def _lengths(route: Route, limits: AxisLimits, rest: Mask) -> Array:
-    """(n,) mm over which the path is made even at each waypoint."""
+    """(n,) mm passed at each waypoint in the time in which the jerk moves an axis by the tolerance."""
     feed = np.minimum(route.feed_mm_s, np.sqrt((limits.velocity**2).sum()))
     feed = np.minimum(np.append(feed, np.inf), np.append(np.inf, feed))
     tolerance = np.where(rest, route.tolerance_mm.max(), route.tolerance_mm)
-    return np.asarray(_LENGTH * feed * np.cbrt(tolerance / limits.jerk.max()))
+    return np.asarray(feed * np.cbrt(tolerance / limits.jerk.max()))
 
 
 def _roughness(arc_mm: Array) -> Array:

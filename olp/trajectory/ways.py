@@ -17,7 +17,7 @@ from olp.trajectory.forecast import straight
 from olp.trajectory.merge import variants
 from olp.trajectory.route import Route
 from olp.trajectory.solvers import SOLVERS, Run, Solver
-from olp.trajectory.spread import spread
+from olp.trajectory.spread import LENGTHS, spread
 
 #: windows of a long run ...
 _WINDOWS = 8
@@ -67,6 +67,10 @@ def _fewer(number: int) -> Callable[[Paths], Route | None]:
     return lambda paths: next(iter(paths.fewer()[number : number + 1]), None)
 
 
+def _even(share: float) -> Callable[[Paths], Route | None]:
+    return lambda paths: spread((paths.fewer() or [paths.run.route])[0], paths.run.limits, share)
+
+
 #: the path of the run itself; others come with what drives it
 OWN = Way(lambda paths: paths.run.route, ())
 WAYS = (
@@ -74,8 +78,8 @@ WAYS = (
     Way(_fewer(1), SOLVERS),
     Way(lambda paths: levelled(paths.run.route), _BENDING, level=True),
     Way(lambda paths: outward(paths.run.route), _BENDING),
-    Way(lambda paths: spread((paths.fewer() or [paths.run.route])[0], paths.run.limits), _BENDING, even=True),
-)  # fmt: skip
+    *(Way(_even(share), _BENDING, even=True) for share in LENGTHS),
+)
 
 
 def windows(run: Run) -> Run | None:

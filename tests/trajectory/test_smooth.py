@@ -159,3 +159,13 @@ def test_bad_routes_are_refused(broken: str) -> None:
         good.feed_mm_s[1] = 0.0
     with pytest.raises(CannotCompute):
         smooth(good, LIMITS)
+
+
+def test_chords_of_a_circle_bend_as_evenly_as_the_circle() -> None:
+    """Kernels that ended between waypoints left teeth of 3.6 times the third derivative of the circle."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 401)
+    chords = 12.0 * np.stack((np.cos(angle), np.sin(angle), 0.0 * angle), axis=1)
+    path = smooth(route(chords, 200.0, 0.005), LIMITS)
+    _, _, second, third = path.at(np.linspace(10.0, 65.0, 2000))
+    assert np.abs(np.linalg.norm(second, axis=1) * 12.0 - 1.0).max() < 0.01
+    assert np.abs(np.linalg.norm(third, axis=1) * 144.0 - 1.0).max() < 0.01
