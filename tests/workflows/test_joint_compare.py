@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 from scipy.spatial.transform import Rotation
 
+import olp
 from olp.cli import main
 from olp.files.kinematics.load import load_joint_setup
 
@@ -112,6 +114,21 @@ def test_the_turn_about_a_tool_that_turns_freely_is_in_no_figure(tmp_path: Path)
     report = json.loads(run(nominal, measured, "--poses", "-m", machine, "--json").stdout)["after"]
     assert report["iso_9283"]["AP_turn_urad"] == pytest.approx([30.0, 0.0, 0.0], abs=1e-6)
     assert report["iso_9283"]["AP_um"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_zero_that_is_touched_moves_what_is_simulated(tmp_path: Path) -> None:
+    """The part lies off by the error where it was touched, and is measured from there."""
+    shutil.copytree(FOLDER / "trunnion-mill", tmp_path / "mill")
+    machine, program, corrected = (tmp_path / "mill" / name for name in ("machine.toml", "p.nc", "p5.nc"))
+    machine.write_text(machine.read_text().replace('set_by = "true"', "X_mm = 150.0\nY_mm = 90.0"))
+    program.write_text("G21 G90 G54 G94\nG0 X-60 Y0 Z50 A0 C0\nG1 Z20 A0 C0 F900\nX-30 A-20 C40\nM30\n")
+    done = olp.correct_joints(program, machine)
+    done.write(corrected)
+    simulated = tmp_path / "run.csv"
+    simulated.write_bytes(olp.simulate_joints(corrected, machine).to_csv())
+    assert done.proof.before.distance_mm[-1] > 0.005
+    report = json.loads(run(program, simulated, "-m", machine, "--align", "none", "--json").stdout)
+    assert report["after"]["across_um"]["max"] < 2.0
 
 
 def test_the_path_of_the_tip_and_its_frames(tmp_path: Path) -> None:

@@ -171,3 +171,24 @@ def test_points_measured_in_a_work_offset_are_compared(tmp_path: Path) -> None:
     call = CliRunner().invoke(main, [str(word) for word in words])
     assert call.exit_code == 0, call.output
     assert json.loads(out.read_text())["after"]["across_um"]["max"] == pytest.approx(20.0, abs=0.01)
+
+
+def test_a_leg_that_is_too_short_between_waypoints_is_found(tmp_path: Path) -> None:
+    """The distance from a point is least inside of a straight line, so legs are beyond their travel there."""
+    made = CliRunner().invoke(main, ["init", str(tmp_path), "--structure", "hexapod"])
+    assert made.exit_code == 0
+    machine, part = tmp_path / "machine.toml", tmp_path / "part.ngc"
+    text = machine.read_text().replace("[700.0, 1100.0]", "[500.0, 1300.0]")
+    text += '\n[work_offsets.G54]\nset_by = "true"\n'
+    machine.write_text(text)
+    part.write_text("G21 G90 G54 G94\nG0 X-400 Y0 Z540 A0 B0 C0\nG1 X-72 F900\nM30\n")
+    legs = olp.simulate_joints(part, machine).axes
+    dip = np.minimum(legs[0], legs[-1]) - legs.min(axis=0)
+    leg = int(dip.argmax())
+    assert dip[leg] > 1.0
+    low = legs[:, leg].min() + 0.5 * dip[leg]
+    tables = text.split("[axes.")
+    tables[leg + 1] = tables[leg + 1].replace("travel_mm = [500.0", f"travel_mm = [{low:.3f}")
+    machine.write_text("[axes.".join(tables))
+    found = {one.code: one for one in olp.check_joints(part, machine).findings}
+    assert found["OLP402"].line == 3 and f"L{leg + 1} is commanded" in found["OLP402"].message

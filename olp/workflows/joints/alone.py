@@ -20,8 +20,19 @@ from olp.workflows.joints.report import calibration_findings, out_of_box
 def alone(run: JointRun, path: JointPath, date: datetime.date | None) -> list[Finding]:
     """Findings on what the program commands, at and between its waypoints: travel, calibrated values, and the
     state of the calibration. Raises ProgramError with the line of a move that no axis values lead."""
-    along, structure = Along.of(path), path.motion.structure
-    line = path.program.in_original().toolpath.line
+    along = Along.of(path)
+    found = travel_findings(along)
+    out = out_of_box(along.move, along.axes, path, run)
+    if out:
+        found.append(finding("OLP403", out[0][1], [number for number, _ in out]))
+    if not path.judged.any():
+        found.append(finding("OLP107", "no feed move ends at a known position"))
+    return [*found, *remark_findings(path.program.in_original()), *calibration_findings(run, date)]
+
+
+def travel_findings(along: Along) -> list[Finding]:
+    """Axes that are commanded beyond their travel, at or between waypoints."""
+    structure, line = along.path.motion.structure, along.path.program.in_original().toolpath.line
     found, beyond = [], beyond_travel(structure, along.axes)
     for column, name in enumerate(structure.order):
         rows = np.flatnonzero(beyond[:, column])
@@ -29,9 +40,4 @@ def alone(run: JointRun, path: JointPath, date: datetime.date | None) -> list[Fi
             low, high = structure.joints[name].travel
             what = f"{name} is commanded beyond its travel of {low:g} to {high:g} {structure.units[column]}"
             found.append(finding("OLP402", what, line[along.move[rows]].tolist()))
-    out = out_of_box(along.move, along.axes, path, run)
-    if out:
-        found.append(finding("OLP403", out[0][1], [number for number, _ in out]))
-    if not path.judged.any():
-        found.append(finding("OLP107", "no feed move ends at a known position"))
-    return [*found, *remark_findings(path.program.in_original()), *calibration_findings(run, date)]
+    return found

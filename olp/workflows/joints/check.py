@@ -10,6 +10,7 @@ from typing import Any
 
 from olp.checks.base import finding
 from olp.checks.stamps import stamp_findings
+from olp.compensation.joints.path import JointPath
 from olp.compensation.stamp import find_stamp
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
@@ -19,7 +20,8 @@ from olp.findings.choice import chosen
 from olp.findings.rule import Severity
 from olp.reports.joints import verdict_of
 from olp.workflows import refusals
-from olp.workflows.joints.alone import alone
+from olp.workflows.joints.alone import alone, travel_findings
+from olp.workflows.joints.along import Along
 from olp.workflows.joints.correct import JointOptions, ProvedJoints, correction_of
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.verify import verification_of
@@ -142,11 +144,14 @@ def _checked(run: JointRun, corrected: Source | None, options: JointOptions) -> 
         done = verification_of(run, corrected, options)
         what = f"the corrected program against the nominal one ({run.program.short or 'stdin'})"
         found = [_in_corrected(one, done) for one in done.findings]
-        return _Checked(what, [*found, *stamp_findings(corrected.data, run.program.data, run.digest)], done)
+        found += stamp_findings(corrected.data, run.program.data, run.digest)
+        return _Checked(what, [*found, *_travel(done.corrected)], done)
     data = run.program.data
     if find_stamp(data) is None:
         done = correction_of(run, options)
-        return _Checked("the result of olp correct on the program", done.findings, done)
+        what = "the result of olp correct on the program"
+        # commands at waypoints are refused beyond the travel; between them nominal ones are as good
+        return _Checked(what, [*done.findings, *_travel(done.nominal)], done)
     with run.program.errors():
         path = run.read(run.program, options)[1]
         found = alone(run, path, options.date)
@@ -154,6 +159,10 @@ def _checked(run: JointRun, corrected: Source | None, options: JointOptions) -> 
     return _Checked(
         what, [*placed_findings(found, path.program.origin), *stamp_findings(data, None, run.digest)]
     )
+
+
+def _travel(path: JointPath) -> Sequence[Finding]:
+    return placed_findings(travel_findings(Along.of(path)), path.program.origin)
 
 
 def _refused(error: ProgramError, run: JointRun, program: Source, options: JointCheckOptions) -> JointCheck:
