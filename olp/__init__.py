@@ -54,6 +54,8 @@ if TYPE_CHECKING:
     from olp.workflows.calibrate_next import plan_next as plan_next
     from olp.workflows.calibrate_plan import MeasurementPlan as MeasurementPlan
     from olp.workflows.calibrate_plan import plan_measurements as plan_measurements
+    from olp.workflows.calibrate_plan_joints import PlannedPoses as PlannedPoses
+    from olp.workflows.calibrate_plan_joints import plan_poses as plan_poses
     from olp.workflows.calibrate_postures import fit_postures as fit_postures
     from olp.workflows.calibrate_probe import ProbedArtefact as ProbedArtefact
     from olp.workflows.calibrate_probe import probe_artefact as probe_artefact
@@ -72,6 +74,7 @@ if TYPE_CHECKING:
     from olp.workflows.inspect import inspect as inspect
     from olp.workflows.joints.check import JointCheck as JointCheck
     from olp.workflows.joints.check import check_joints as check_joints
+    from olp.workflows.joints.compare import compare_joints as compare_joints
     from olp.workflows.joints.correct import JointCorrection as JointCorrection
     from olp.workflows.joints.correct import correct_joints as correct_joints
     from olp.workflows.joints.doctor import DiagnosedJoints as DiagnosedJoints
@@ -119,6 +122,8 @@ _HOME = {
     "refine_calibration": "olp.workflows.calibrate_refine",
     "MeasurementPlan": "olp.workflows.calibrate_plan",
     "plan_measurements": "olp.workflows.calibrate_plan",
+    "PlannedPoses": "olp.workflows.calibrate_plan_joints",
+    "plan_poses": "olp.workflows.calibrate_plan_joints",
     "plan_next": "olp.workflows.calibrate_next",
     "ProbedArtefact": "olp.workflows.calibrate_probe",
     "probe_artefact": "olp.workflows.calibrate_probe",
@@ -145,6 +150,7 @@ _HOME = {
     "view_joints": "olp.review.joints",
     "JointCheck": "olp.workflows.joints.check",
     "check_joints": "olp.workflows.joints.check",
+    "compare_joints": "olp.workflows.joints.compare",
     "JointCorrection": "olp.workflows.joints.correct",
     "correct_joints": "olp.workflows.joints.correct",
     "JointRetiming": "olp.workflows.joints.retime",

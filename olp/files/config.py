@@ -109,7 +109,8 @@ def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, 
     if of_joints(values):
         raise ProgramError(
             f"the machine has the chain {values.get('chain')}, and not three linear axes alone, which is not "
-            "built here; use olp correct, verify, check, simulate or inspect, in Python olp.correct_joints",
+            "built here; use the same verb of the command line, or in Python a function for joints, such as "
+            "olp.correct_joints",
             file=str(path),
             line=line_of(("chain",), lines),
             code="OLP563",

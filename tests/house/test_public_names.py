@@ -28,7 +28,7 @@ PUBLIC = {
     *("evaluate_lines", "fit_ballbar", "fit_diagonals", "fit_postures", "go_return"),
     *("fit_thermal", "ThermalFitting", "correct_results", "ResultCorrection"),
     *("correct_poses", "CorrectedPoses", "correct_joints", "JointCorrection", "verify_joints"),
-    *("check_joints", "JointCheck"),
+    *("check_joints", "JointCheck", "compare_joints", "plan_poses", "PlannedPoses"),
     *("view_joints", "retime_joints", "JointRetiming"),
     *("JointVerification", "simulate_joints", "JointSimulation"),
     *("OlpError", "InputError", "ConfigError", "ProgramError", "Refused", "CannotCompute"),

@@ -127,8 +127,8 @@ def test_a_zero_that_is_touched_moves_what_is_simulated(tmp_path: Path) -> None:
     simulated = tmp_path / "run.csv"
     simulated.write_bytes(olp.simulate_joints(corrected, machine).to_csv())
     assert done.proof.before.distance_mm[-1] > 0.005
-    report = json.loads(run(program, simulated, "-m", machine, "--align", "none", "--json").stdout)
-    assert report["after"]["across_um"]["max"] < 2.0
+    found = olp.compare_joints(program, [simulated], machine, align="none")
+    assert found.report["after"]["across_um"]["max"] < 2.0
 
 
 def test_the_path_of_the_tip_and_its_frames(tmp_path: Path) -> None:

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from olp.comparison.pairing import Order
 from olp.comparison.path import Path
+from olp.comparison.runs import Align
 from olp.compensation.joints.path import JointPath
 from olp.core.arrays import Array, Index
 from olp.core.errors import InputError, UsageError
@@ -32,6 +34,33 @@ from olp.workflows.session import PathLike
 _WORKPIECE = "workpiece"
 #: Nominal paths are sampled at least so often, mm.
 _STEP_MM = 0.5
+
+
+def compare_joints(
+    program: PathLike | bytes,
+    measured: Sequence[PathLike],
+    machine: PathLike,
+    job: PathLike | None = None,
+    *,
+    before: Sequence[PathLike] = (),
+    poses: bool = False,
+    profile: PointProfile | None = None,
+    align: Align = "auto",
+    order: Order | None = None,
+    reach_mm: float = 1.0,
+    part_tolerance_um: float | None = None,
+    flatten: bool = False,
+    expand_cycles: bool = False,
+    date: datetime.date | None = None,
+) -> Comparison:
+    """As `compare`, on a machine with rotary joints: measured tips in workpiece coordinates against those of
+    the nominal machine. The report states how well the calibration knows these poses, where it has a
+    covariance. Raises InputError, UsageError and CannotCompute."""
+    options = CompareOptions(
+        before=tuple(before), poses=poses, profile=profile, align=align, order=order, reach_mm=reach_mm,
+        part_tolerance_um=part_tolerance_um, flatten=flatten, expand_cycles=expand_cycles, date=date,
+    )  # fmt: skip
+    return compare_with(JointRun.of(program, machine, job), measured, options)
 
 
 def compare_with(run: JointRun, measured: Sequence[PathLike], options: CompareOptions) -> Comparison:
