@@ -19,8 +19,10 @@ from olp.calibration.joints.adjustment import (
 from olp.calibration.joints.deciding import AGREES, DECIDED, log_odds, odds_in_words
 from olp.calibration.joints.mistakes import RIGHT, mistakes, row_mistakes
 from olp.calibration.joints.payloads import unstated_payloads
-from olp.calibration.joints.readings import Reading
+from olp.calibration.joints.readings import Ball, Reading
+from olp.calibration.joints.tools import other_tools
 from olp.calibration.joints.unknowns import Model
+from olp.calibration.joints.ways import by_way
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
@@ -41,6 +43,12 @@ _WORSE = 2.0
 _QUICK = 7
 #: At most so many names are listed.
 _NAMED = 8
+#: Reduced chi-square of readings that agree better than they can.
+_QUIET = 0.1
+#: Errors of a machine with other dimensions are so many times as large as usual.
+_WIDE = 30.0
+#: So many of its numbers are named.
+_FEW = 3
 #: So many readings are left out in search of wrong ones, or a twentieth where that is more.
 _ROWS = 4
 
@@ -95,7 +103,8 @@ def _findings(fit: JointFit, readings: Sequence[Reading]) -> Iterator[Finding]:
             f"reduced chi-square is {reduced:.3g}; expected about 1: the stated uncertainty covers this by a "
             f"factor of {np.sqrt(reduced):.3g}",
         )
-    if reduced > 1.0 + _SUSPECT * np.sqrt(2.0 / fit.freedom) or _strained(fit):
+    noisy = reduced > 1.0 + _SUSPECT * np.sqrt(2.0 / fit.freedom)
+    if noisy or reduced < _QUIET or _strained(fit):
         cause = _cause(fit.model, readings, fit)
         if cause is not None:
             yield Finding("OLP810", str(cause))
@@ -146,21 +155,63 @@ def _cause(model: Model, readings: Sequence[Reading], fit: JointFit | None) -> _
     found = list[_Cause]()
     # errors of a machine are small beside most mistakes: what is far from the nominal one is not the cause
     worst = _WORSE * _nominal(model, readings)
-    for words, mended, share in (*mistakes(model.structure, readings), *unstated_payloads(model, readings)):
-        if _nominal(model, mended) > worst:
+    for words, mended, share in (
+        *mistakes(model.structure, readings),
+        *unstated_payloads(model, readings),
+        *other_tools(model, readings),
+        *(by_way(fit, readings) if fit is not None else ()),
+    ):
+        volume = _volume(readings, mended)
+        if volume <= 0.0 and _nominal(model, mended) > worst:
             continue
         try:
             other = adjusted(model, starts_of(model, mended), _QUICK)
         except (CannotCompute, ConfigError):
             continue
         then = other.chi_square / other.freedom
-        odds = log_odds(stated, other.score, then)
+        odds = log_odds(stated, other.score, then) + volume
         explains = then < (_PLAUSIBLE if fit is None else max(AGREES, share * before))
         if explains and odds > DECIDED:
             found.append(_Cause(words, before, then, odds))
     if found:
         return min(found, key=lambda one: one.after)
-    return _worst_rows(model, readings, before, stated)
+    return _worst_rows(model, readings, before, stated) or _other_dimensions(model, readings, before, stated)
+
+
+def _other_dimensions(
+    model: Model, readings: Sequence[Reading], before: float, stated: float
+) -> _Cause | None:
+    """A machine of other dimensions than stated, whose readings these are. Each number that may be so large
+    makes it less likely."""
+    usual, known = model.unknowns, np.square(_WIDE) * np.linalg.inv(model.precision)
+    unknowns = tuple(replace(unknown, prior=_WIDE * unknown.prior) for unknown in usual)
+    wide = replace(model, unknowns=unknowns, known=known)
+    try:
+        fit = adjusted(wide, starts_of(wide, readings))
+    except (CannotCompute, ConfigError):
+        return None
+    reduced = fit.chi_square / fit.freedom
+    odds = log_odds(stated, fit.score, reduced) - fit.determined * float(np.log(_WIDE))
+    if reduced > AGREES or odds < DECIDED:
+        return None
+    off = sorted(zip(usual, fit.theta.tolist(), strict=True), key=lambda one: -abs(one[1]) / one[0].prior)
+    named = ", ".join(f"{one.name} {value / one.scale:+.0f}" for one, value in off[:_FEW])
+    words = (
+        f"they are of another machine, or its dimensions are not those of the machine file: most unusual are "
+        f"{named}"
+    )
+    return _Cause(words, before, reduced, odds)
+
+
+def _volume(readings: Sequence[Reading], mended: Sequence[Reading]) -> float:
+    """By how much the log of the odds grows where balls are read in a larger unit than stated: readings lie
+    closer together than noise has them."""
+    whole = 0.0
+    for one, other in zip(readings, mended, strict=True):
+        if isinstance(one, Ball) and isinstance(other, Ball) and one.count == other.count:
+            before, after = (float(np.linalg.norm(each.measured_mm)) for each in (one, other))
+            whole += one.measured_mm.size * float(np.log(after / before)) if before and after else 0.0
+    return whole
 
 
 def _nominal(model: Model, readings: Sequence[Reading]) -> float:

@@ -5,14 +5,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import PurePath
 
 import numpy as np
 
 from olp.calibration.joints.adjustment import OUTLIER, JointFit, starts_of
+from olp.calibration.joints.candidates import SHIFTS
 from olp.calibration.joints.deciding import log_odds
 from olp.calibration.joints.readings import Ball, Lengths, Points, Reading, SixD, Start
 from olp.core.arrays import Array
+from olp.core.geometry import rotation_matrix
+from olp.core.rigid_fit import Rigid
 from olp.kinematics.errors import Payload
 from olp.kinematics.poses import Poses
 from olp.kinematics.structure import Structure
@@ -25,13 +29,19 @@ RIGHT = 0.05
 _EITHER = 0.5
 #: Values that may be radians are at most this large: two turns and a half.
 _RADIANS = 16.0
+#: Values that may be degrees times 57.3 are beyond the travel by this factor.
+_BEYOND = 1.05
 #: mm in an inch.
 _INCH = 25.4
 #: um in a mm.
 _UM = 1000.0
 #: A mirror: together with the unknown frame it stands for all of them.
 _MIRROR = np.diag((1.0, 1.0, -1.0))
-_LEFT_HANDED = "the frame of the tracker is left-handed: one of its axes is reversed"
+_LEFT_HANDED = (
+    "the frame of the tracker is left-handed: one of its axes is reversed, or two columns are exchanged"
+)
+#: Largest angle of a target that may be radians, as degrees would be read: half a turn.
+_HALF_TURN = 3.15
 #: At most so many readings that were left out are paired.
 _PAIRED = 8
 
@@ -74,19 +84,31 @@ def shown(readings: Sequence[Reading]) -> list[Reading]:
 
 def _of_axes(structure: Structure, readings: Sequence[Reading]) -> Iterator[tuple[str, list[Reading]]]:
     largest = np.max([np.abs(reading.values).max(axis=0) for reading in readings], axis=0)
-    radians = list[str]()
-    for name, joint, most in zip(structure.joints, structure.joints.values(), largest, strict=True):
+    joints = structure.joints
+    most = dict(zip(joints, largest.tolist(), strict=True))
+    turning = [name for name, joint in joints.items() if joint.kind == "rotary"]
+    for name in joints:
         yield f"axis {name} runs the other way in these readings", _scaled(structure, readings, [name], -1.0)
-        if joint.kind != "rotary":
-            words = f"axis {name} is in inches in these readings"
-            yield words, _scaled(structure, readings, [name], _INCH)
-        elif most < _RADIANS:
-            radians.append(name)
-    for names in dict.fromkeys((*((name,) for name in radians), tuple(radians))):
-        what = f"axis {names[0]} is" if len(names) == 1 else f"axes {', '.join(names)} are"
-        if names:
-            mended = _scaled(structure, readings, names, float(np.degrees(1.0)))
-            yield f"{what} in radians in these readings", mended
+    slides = [name for name in joints if name not in turning]
+    small = [name for name in turning if most[name] < _RADIANS]
+    wide = [name for name in turning if most[name] > _BEYOND * np.abs(joints[name].travel).max()]
+    for group, what, factor in (
+        (slides, "in inches", _INCH),
+        (small, "in radians", float(np.degrees(1.0))),
+        (wide, "57.3 times too large, as degrees that were taken for radians,", float(np.radians(1.0))),
+    ):
+        for names in dict.fromkeys((*((name,) for name in group), tuple(group)) if group else ()):
+            axes = f"axis {names[0]} is" if len(names) == 1 else f"axes {', '.join(names)} are"
+            yield f"{axes} {what} in these readings", _scaled(structure, readings, names, factor)
+    for one, other in combinations(joints, 2):
+        if joints[one].kind == joints[other].kind:
+            columns = list(range(len(joints)))
+            a, b = structure.order.index(one), structure.order.index(other)
+            columns[a], columns[b] = b, a
+            yield (
+                f"axes {one} and {other} are in each other's columns",
+                [replace(reading, values=reading.values[:, columns]) for reading in readings],
+            )
 
 
 def _scaled(
@@ -117,6 +139,8 @@ def _of_names(reading: Reading) -> Iterator[tuple[str, Reading]]:
 def _of_instrument(reading: Reading) -> Iterator[tuple[str, Reading]]:
     """A frame that is mirrored, another unit, another sign."""
     changes: list[tuple[str, Callable[[Array], Array]]] = []
+    if isinstance(reading, SixD):
+        yield from _of_angles(reading)
     if isinstance(reading, Points | SixD):
         changes += [
             (_LEFT_HANDED, lambda m: m @ _MIRROR),
@@ -130,6 +154,7 @@ def _of_instrument(reading: Reading) -> Iterator[tuple[str, Reading]]:
             ("readings are of the other sign: ball against tip", lambda m: -m),
             ("readings are in mm, not um", lambda m: m * _UM),
         ]
+        yield from _of_columns(reading)
         words = "workpiece" if reading.in_machine else "machine"
         yield (
             f"readings are along the axes of the {words}",
@@ -141,6 +166,26 @@ def _of_instrument(reading: Reading) -> Iterator[tuple[str, Reading]]:
         if isinstance(mended, SixD) and words == _LEFT_HANDED:
             mended = replace(mended, measured_turn=_MIRROR @ mended.measured_turn @ _MIRROR)
         yield words, mended
+
+
+def _of_columns(reading: Ball) -> Iterator[tuple[str, Reading]]:
+    """One column of a ball with the other sign, or two in each other's place."""
+    for k, letter in enumerate(SHIFTS):
+        signs = np.where(np.arange(3) == k, -1.0, 1.0)
+        yield f"d{letter} is of the other sign", replace(reading, measured_mm=reading.measured_mm * signs)
+    for a, b in combinations(range(3), 2):
+        columns = [0, 1, 2]
+        columns[a], columns[b] = b, a
+        words = f"d{SHIFTS[a]} and d{SHIFTS[b]} are in each other's columns"
+        yield words, replace(reading, measured_mm=reading.measured_mm[:, columns])
+
+
+def _of_angles(reading: SixD) -> Iterator[tuple[str, Reading]]:
+    """Angles of a target in radians, as small as these are."""
+    angles = np.array([Rigid(turn, np.zeros(3)).angles_deg for turn in reading.measured_turn])
+    if np.abs(angles).max() < _HALF_TURN:
+        turns = np.stack([rotation_matrix((a, b, c)) for a, b, c in np.degrees(angles).tolist()])
+        yield "angles of the target are in radians", replace(reading, measured_turn=turns)
 
 
 def row_mistakes(fit: JointFit, readings: Sequence[Reading]) -> Iterator[tuple[str, float]]:
