@@ -13,11 +13,12 @@ from olp.calibration.joints.adjustment import (
     JointFit,
     LeftOut,
     adjusted,
+    block_of,
     fit_joints,
     starts_of,
 )
 from olp.calibration.joints.deciding import AGREES, DECIDED, log_odds, odds_in_words
-from olp.calibration.joints.mistakes import RIGHT, mistakes, row_mistakes
+from olp.calibration.joints.mistakes import RIGHT, Mended, mistakes, row_mistakes
 from olp.calibration.joints.payloads import unstated_payloads
 from olp.calibration.joints.readings import Ball, Reading
 from olp.calibration.joints.tools import other_tools
@@ -39,6 +40,8 @@ _HELD = 0.5
 _PLAUSIBLE = 25.0
 #: Readings put right are not farther from the machine before them than this, as a factor of chi-square.
 _WORSE = 2.0
+#: Nor than this factor of what errors as usual make of it.
+_UNUSUAL = 10.0
 #: Readings put right settle within so many steps.
 _QUICK = 7
 #: At most so many names are listed.
@@ -153,29 +156,49 @@ def _cause(model: Model, readings: Sequence[Reading], fit: JointFit | None) -> _
     # with the rows that a fit leaves out put back, as those of a mistake are all used
     stated = np.inf if fit is None else fit.score + sum(out.deviations**2 for out in fit.left_out)
     found = list[_Cause]()
-    # errors of a machine are small beside most mistakes: what is far from the nominal one is not the cause
-    worst = _WORSE * _nominal(model, readings)
-    for words, mended, share in (
-        *mistakes(model.structure, readings),
-        *unstated_payloads(model, readings),
-        *other_tools(model, readings),
-        *(by_way(fit, readings) if fit is not None else ()),
-    ):
-        volume = _volume(readings, mended)
-        if volume <= 0.0 and _nominal(model, mended) > worst:
-            continue
+    for words, mended, share in _offers(model, readings, fit):
         try:
             other = adjusted(model, starts_of(model, mended), _QUICK)
         except (CannotCompute, ConfigError):
             continue
         then = other.chi_square / other.freedom
-        odds = log_odds(stated, other.score, then) + volume
+        odds = log_odds(stated, other.score, then) + _volume(readings, mended)
         explains = then < (_PLAUSIBLE if fit is None else max(AGREES, share * before))
         if explains and odds > DECIDED:
             found.append(_Cause(words, before, then, odds))
     if found:
         return min(found, key=lambda one: one.after)
     return _worst_rows(model, readings, before, stated) or _other_dimensions(model, readings, before, stated)
+
+
+def _offers(model: Model, readings: Sequence[Reading], fit: JointFit | None) -> Iterator[Mended]:
+    """The mistakes that are worth a fit: what is farther from the nominal machine than readings as they are,
+    and than errors as usual have it, is not the cause."""
+    offers = [
+        *mistakes(model.structure, readings),
+        *unstated_payloads(model, readings),
+        *other_tools(model, readings),
+        *(by_way(fit, readings) if fit is not None else ()),
+    ]
+    far = [_nominal(model, mended) for _, mended, _ in offers]
+    now = _nominal(model, readings)
+    least = now if np.isfinite(now) else min(far, default=now)
+    worst = max(_WORSE * least, _UNUSUAL * _usual(model, readings))
+    for offer, away in zip(offers, far, strict=True):
+        if away <= worst or _volume(readings, offer[1]) > 0.0:
+            yield offer
+
+
+def _usual(model: Model, readings: Sequence[Reading]) -> float:
+    """Chi-square that errors as usual make of readings, at most; 0 where these do not settle."""
+    whole, zero = 0.0, np.zeros(len(model.unknowns))
+    try:
+        for start in starts_of(model, readings):
+            (chunk,) = block_of(model, zero, start, np.zeros(len(start.prior))).chunks()
+            whole += chunk.y.size + float(np.sum((chunk.rows @ model.root / chunk.sigma[:, None]) ** 2))
+    except (CannotCompute, ConfigError):
+        return 0.0
+    return whole
 
 
 def _other_dimensions(
@@ -239,7 +262,10 @@ def _worst_rows(model: Model, readings: Sequence[Reading], before: float, stated
 def without_worst(model: Model, readings: Sequence[Reading], below: float) -> JointFit | None:
     """The fit without the fewest readings whose rest is below a reduced chi-square, the worst one left out
     first; None where a few are not enough."""
-    starts, out = starts_of(model, readings), list[LeftOut]()
+    try:
+        starts, out = starts_of(model, readings), list[LeftOut]()
+    except CannotCompute:
+        return None
     most = max(_ROWS, sum(start.reading.count for start in starts) // 20)
     for _ in range(most):
         try:

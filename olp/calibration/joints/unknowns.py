@@ -29,6 +29,8 @@ _ALIKE = 1e-6
 _POSTURES = 40
 #: So many blends of the postures that were read do so for a machine with platforms.
 _BLENDED = 120
+#: Share of the travel about its middle in which platforms close.
+_INNER = 0.2
 #: Nothing is held.
 NO_PAYLOAD = Payload()
 
@@ -155,7 +157,13 @@ def model_of(
     follows no sum of angles."""
     candidates = tuple(listed(structure, priors))
     full = Model(structure, candidates, (), datum_mm)
-    kept, usual = _kept(full, _postures(structure, values))
+    try:
+        kept, usual = _kept(full, _postures(structure, values))
+    except CannotCompute:
+        if not structure.platforms:
+            raise
+        # values of readings that are not those of the machine: the fit of these says what is wrong
+        kept, usual = _kept(full, _middle(structure))
     elastic = tuple(of_weight(structure, priors, yielding, sagging))
     known = np.diag([*np.zeros(len(kept)), *(unknown.prior**2 for unknown in elastic)])
     known[: len(kept), : len(kept)] = usual
@@ -177,11 +185,23 @@ def _postures(structure: Structure, values: Array) -> Array:
     platform closes in a part of it alone."""
     random = np.random.default_rng(0)
     if not structure.platforms:
-        ends = np.array([joint.travel for joint in structure.joints.values()])
+        ends = _travels(structure)
         return random.uniform(ends[:, 0], ends[:, 1], (_POSTURES, len(ends)))
     first, second = random.integers(0, len(values), (2, _BLENDED))
     share = random.uniform(0.0, 1.0, (_BLENDED, 1))
     return np.asarray(share * values[first] + (1.0 - share) * values[second])
+
+
+def _middle(structure: Structure) -> Array:
+    """Random postures about the middle of the travel, where platforms close."""
+    ends = _travels(structure)
+    middle, reach = ends.mean(axis=1), _INNER * 0.5 * np.ptp(ends, axis=1)
+    return np.random.default_rng(0).uniform(middle - reach, middle + reach, (_BLENDED, len(ends)))
+
+
+def _travels(structure: Structure) -> Array:
+    """(axes, 2) mm or deg."""
+    return np.array([joint.travel for joint in structure.joints.values()])
 
 
 def _kept(model: Model, values: Array) -> tuple[list[int], Array]:

@@ -12,13 +12,15 @@ import pytest
 from calibration.joints.simulated import SIGMA, read, true_machine
 
 from olp.calibration.joints.adjustment import fit_joints
-from olp.calibration.joints.findings import joint_findings
+from olp.calibration.joints.candidates import Priors
+from olp.calibration.joints.findings import fit_or_refuse, joint_findings
 from olp.calibration.joints.mistakes import mistakes
 from olp.calibration.joints.readings import Ball, Reading, SixD
 from olp.calibration.joints.tools import other_tools
-from olp.calibration.joints.unknowns import Model
+from olp.calibration.joints.unknowns import Model, model_of
 from olp.calibration.joints.ways import by_way, ways_of
 from olp.core.arrays import Array
+from olp.core.errors import ConfigError
 from olp.core.geometry import rotation_matrix
 
 
@@ -150,3 +152,15 @@ def test_readings_of_a_ball_in_mm_are_told_though_they_fit_too_well() -> None:
     (words,) = told(model, [replace(reading, measured_mm=1e-3 * reading.measured_mm)])
     assert "readings are in mm, not um" in words
     assert [*told(model, [reading])] == []
+
+
+@pytest.mark.slow
+def test_values_with_which_no_leg_closes_are_told() -> None:
+    """A tripod whose legs are in inches: the model is that of the middle of its travel then."""
+    model, _, values = true_machine("tripod", count=30)
+    right = read("points", model.machine(np.zeros(len(model.unknowns))).actual(values), values)
+    wrong = replace(right, values=values / 25.4)
+    found = model_of(model.structure, wrong.values, Priors.of(model.structure))
+    assert [one.name for one in found.unknowns] == [one.name for one in model.unknowns]
+    with pytest.raises(ConfigError, match="are in inches"):
+        fit_or_refuse(replace(found, unknowns=(), known=None), [wrong])
