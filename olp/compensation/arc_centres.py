@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
-from olp.compensation.arcs import WIDE, Pieces, fit, sample_groups, sampled
+from olp.compensation.arcs import WIDE, Bend, Pieces, fit, sample_groups, sampled
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
 from olp.core.arrays import Array, Index, Mask, most_in_row
@@ -54,8 +56,9 @@ class ArcRows:
 
 def solve(writer: Writer, rows: Rows, by_angle: Mask | None = None) -> ArcRows:
     """The corrected arcs among rows, with their centres from the emitted end points and the bent path between
-    them. Raises ProgramError where the last digit decides whether an arc is a whole circle, which it does not
-    in the rows (r,) `by_angle`, whose blocks state how far they turn."""
+    them. Where the sagitta is less than the rounding of the ends, the path between does not tell the centre,
+    and the arc keeps its radius. Raises ProgramError where the last digit decides whether an arc is a whole
+    circle, which it does not in the rows (r,) `by_angle`, whose blocks state how far they turn."""
     path, plan = writer.path, writer.plan
     arc_row = np.flatnonzero(rows.arc & ~rows.take_up & ((rows.flag & np.uint8(Flag.PASS)) == 0))
     move = rows.move[arc_row]
@@ -84,6 +87,12 @@ def solve(writer: Writer, rows: Rows, by_angle: Mask | None = None) -> ArcRows:
         best = fit(bend, plane[part], start[part], end[part], sweep[part], by_angle is not None)
         equal = (np.abs(sweep[part]) <= WIDE) & (np.abs(bend.mismatch) < 1e-6) & ~bend.rigid
         centre[part] = _on_bisector(start[part], end[part], best, plane[part], equal)
+        flat = _flat(bend, start[part], end[part], sweep[part], plane[part]) & ~bend.rigid
+        small = np.flatnonzero(flat & (np.abs(sweep[part]) <= WIDE))
+        if small.size:
+            which = part[small]
+            radius = _radius(_picked(bend, small), plane[which], sweep[which], by_angle is not None)
+            _set_radius(centre, which, start, end, sweep, plane, radius)
         # an arc that is only shifted keeps its words
         shift = bend.command[:, 0] - bend.point[:, 0]
         alike = most_in_row(np.abs(start[part] - bend.point[:, 0] - end[part] + bend.point[:, -1])) < 1e-7
@@ -134,6 +143,40 @@ def _on_bisector(start: Array, end: Array, centre: Array, plane: npt.NDArray[np.
     moved = centre.copy()
     put_in_planes(moved, plane, c0 - along * d0, c1 - along * d1)
     return moved
+
+
+def _flat(bend: Bend, start: Array, end: Array, sweep: Array, plane: npt.NDArray[np.int8]) -> Mask:
+    """(n,) whether arcs rise above their chords by less than their ends were rounded."""
+    rounded = [np.hypot(*arms(written, bend.command[:, k], plane)) for written, k in ((start, 0), (end, -1))]
+    radius = np.hypot(*arms(bend.command[:, 0], bend.centre, plane))
+    return np.asarray(radius * (1.0 - np.cos(sweep / 2)) < np.maximum(*rounded), bool)
+
+
+def _picked(bend: Bend, which: Index) -> Bend:
+    """Some of the pieces of a sampling."""
+    names = ("point", "command", "centre", "mismatch", "rigid")
+    return replace(bend, **{name: getattr(bend, name)[which] for name in names})
+
+
+def _radius(bend: Bend, plane: npt.NDArray[np.int8], sweep: Array, one_radius: bool) -> Array:
+    """(n,) the radii of pieces of arcs between their ends before rounding."""
+    start, end = bend.command[:, 0], bend.command[:, -1]
+    return np.hypot(*arms(start, fit(bend, plane, start, end, sweep, one_radius), plane))
+
+
+def _set_radius(
+    centre: Array, which: Index, start: Array, end: Array, sweep: Array,
+    plane: npt.NDArray[np.int8], radius: Array,
+) -> None:  # fmt: skip
+    """Set the centres (m, 3) of arcs up to half a circle, `which` of all, by a `radius` (n,) each."""
+    (s0, s1, _), (e0, e1, _) = (in_planes(some[which], plane[which]) for some in (start, end))
+    half0, half1 = (e0 - s0) / 2, (e1 - s1) / 2
+    half = np.hypot(half0, half1)
+    away = np.sqrt(np.maximum(radius * radius - half * half, 0.0)) * np.sign(sweep[which])
+    away = np.divide(away, half, out=np.zeros_like(half), where=half > 0)
+    moved = centre[which]
+    put_in_planes(moved, plane[which], s0 + half0 - away * half1, s1 + half1 + away * half0)
+    centre[which] = moved
 
 
 def _check_sweep(arcs: ArcRows) -> None:

@@ -7,6 +7,7 @@ Z - 0.020. One has a backlash of 6 um in X and 4 um in Y: a drive leads by half 
 
 from __future__ import annotations
 
+from math import hypot
 from pathlib import Path
 
 import pytest
@@ -408,6 +409,18 @@ def test_a_circle_that_rounding_would_make_a_short_arc_is_refused(tmp_path: Path
     with pytest.raises(ProgramError, match="the last digit decides"):
         corrected(tmp_path, "scale", text.format("G3"))
     assert b"G2 X5.0025 Y0" in corrected(tmp_path, "scale", text.format("G2")).data
+
+
+@pytest.mark.parametrize("form", ["I0.007 J-0.650", "R0.650"])
+def test_a_short_arc_keeps_its_radius_where_rounding_would_turn_it_over(form: str, tmp_path: Path) -> None:
+    """The arc rises by 0.04 um only: with both ends rounded up by 0.4 um its middle is below them."""
+    text = HEAD + "".join(f"G1 X{x} Y0 F100\nG2 X{x}.014 {form}\n" for x in (4, 6, 8))
+    result = corrected(tmp_path, "turned", text)
+    arcs = [line.split() for line in result.data.decode().splitlines() if line.startswith("G2 ")]
+    radii = [hypot(*(float(word[1:]) for word in words[2:] if word[0] in "IJR")) for words in arcs]
+    assert radii == pytest.approx([0.65] * 3, abs=2e-4)
+    assert all(float(words[-1][1:]) * (1 if form[0] == "R" else -1) > 0 for words in arcs)
+    assert result.report["deviation"]["holds"]
 
 
 @pytest.mark.parametrize(
