@@ -169,7 +169,7 @@ class Machine:
     None where it stands still; with `track_errors` it is a joint with errors of its own. `external` are
     other external axes by their numbers, with the value at which one stays, None where it moves neither arm
     nor workpiece. `third_level` is whether programs count the third joint from the horizontal, None where
-    that is not stated.
+    that is not stated. `file` is the machine file, None where there is none.
     """
 
     name: str
@@ -212,6 +212,7 @@ class Machine:
     track_errors: bool = False
     external: Mapping[int, float | None] = field(default_factory=dict)
     pulses_per_deg: tuple[float, ...] | None = None
+    file: str | None = None
 
     @property
     def least_increment_mm(self) -> Vector:

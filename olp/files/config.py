@@ -129,6 +129,7 @@ def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, 
     }
     machine = Machine(
         name=file.name,
+        file=str(path),
         chain=file.chain,
         controller=file.controller,
         decimal_point=file.decimal_point,

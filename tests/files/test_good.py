@@ -43,6 +43,7 @@ TRAVEL = {"X": (-5.0, 300.0), "Y": (0.0, 200.0), "Z": (-120.5, 0.0)}
 def test_machine_file_fills_every_value() -> None:
     assert load_machine(GOOD / "machine.toml") == Machine(
         name="gantry-2",
+        file=str(GOOD / "machine.toml"),
         chain="FXYZ",
         controller="linuxcnc",
         axes={

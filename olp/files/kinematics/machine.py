@@ -102,6 +102,7 @@ def _control(file: JointMachineFile, structure: Structure, path: PathLike) -> Ma
         }
     return Machine(
         name=file.name,
+        file=str(path),
         chain=" ".join(structure.chain),
         controller=file.controller,
         axes=axes,

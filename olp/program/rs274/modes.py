@@ -442,7 +442,7 @@ def _check_deleted(context: Context, state: AxisState) -> None:
     if changed.any():
         raise ProgramError(
             "a block under block delete changes a modal code that later blocks depend on; "
-            "restate the code in the next block or remove the `/`",
+            f"restate the code in the next block, or {state.profile.without_switch}",
             line=context.number(int(lines[np.argmax(changed)])),
             code="OLP525",
         )

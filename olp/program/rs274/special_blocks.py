@@ -114,7 +114,7 @@ def event_block(
     ):
         raise ProgramError(
             "a block under block delete changes offsets, units, path mode, the tool or its compensation, "
-            "so later blocks depend on the switch; remove the `/`",
+            f"so later blocks depend on the switch; {profile.without_switch}",
             line=line,
             code="OLP525",
         )
@@ -159,6 +159,15 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
                 word="" if c in MACROS else name,
             )
     for m in [round(word.value * 10) for word in words if word.letter == "M"]:
+        if _calls_by_m(m, words, profile):
+            raise ProgramError(
+                f"M{m / 10:g} with P may call a macro, whose arguments are the other words of its block; "
+                "write plain blocks in its place, or list it in still_m_codes of the machine file where it "
+                "moves no axis",
+                line=line,
+                code="OLP512",
+                word=f"M{m / 10:g}",
+            )
         if m in profile.m_refusals:
             helps, instead = profile.unrolls_m(m), profile.m_instead.get(m, "")
             why = f"M{m / 10:g} {profile.m_refusals[m]}"
@@ -180,6 +189,21 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
                 code="OLP512",
             )
     return [c for c, a in codes if a == Act.EVENT]
+
+
+def _calls_by_m(m: int, words: list[Word], profile: Profile) -> bool:
+    """Whether an M code, ten times its number, may call a macro with the words of its block: parameters of
+    these controls make M codes call one."""
+    letters = {word.letter for word in words}
+    own = m in profile.still_m or m in profile.m_refusals or m in profile.home_m or m in _TOOL_CODES
+    return (
+        profile.language.macro_b
+        and not profile.language.user_tasks
+        and not own
+        and "P" in letters
+        and "G" not in letters
+        and (_has_axes(words) or not letters.isdisjoint("DH"))
+    )
 
 
 def _has_axes(words: list[Word]) -> bool:

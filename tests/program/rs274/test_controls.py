@@ -514,7 +514,7 @@ def test_calls_and_saved_modes_say_how_to_unroll_them(word: str, why: str, setup
     assert f"{word} {why}" in got
 
 
-@pytest.mark.parametrize("control", [MACH4, FANUC, HAAS, MAZAK, SIEMENS])
+@pytest.mark.parametrize("control", [MACH3, MACH4, FANUC, HAAS, MAZAK, SIEMENS])
 def test_codes_that_save_modes_on_linuxcnc_are_those_of_the_builder(
     control: str, setups: dict[str, Setup]
 ) -> None:
@@ -527,6 +527,19 @@ def test_codes_that_save_modes_on_linuxcnc_are_those_of_the_builder(
         assert (x, y == y, z == z) == (5.0, False, False)
         machine_ = replace(setup.machine, still_m_codes=frozenset({int(word[1:])}))
         assert outcome(text, replace(setup, machine=machine_), profile) == (5, 2, 3)
+
+
+@pytest.mark.parametrize("control", [FANUC, HAAS, MAZAK, MACH4])
+def test_an_m_code_that_may_call_a_macro_takes_no_axis_words(control: str, setups: dict[str, Setup]) -> None:
+    """`M165 P9811 Z0 S2` of a probing macro is no move to Z0."""
+    setup, profile = setups[control], DIALECTS[control]
+    assert isinstance(profile, Profile)
+    for words in ("P9811 Z0. S2.", "P9814 D.5 S2."):
+        text = f"G0 X1. Y2. Z3.\nM165 {words}\nG0 X5."
+        assert "2: M165 with P may call a macro" in str(outcome(text, setup, profile))
+    # alone it moves the axes to no known place, and behind G0 P is no number of a program
+    for text in ("M165 P9832", "G0 X5. M165 P1"):
+        assert not isinstance(outcome(f"G0 X1. Y2. Z3.\n{text}\nG0 X5.", setup, profile), str)
 
 
 #: M codes that move no axis, by the manuals of the controls.

@@ -243,11 +243,13 @@ def parametric(text: str) -> str:
 
 MODAL = (
     "a block under block delete changes a modal code that later blocks depend on; "
-    "restate the code in the next block or remove the `/`"
+    "restate the code in the next block, or remove the `/`, or unroll the program with --flatten and "
+    "state block_delete in the job file"
 )
 STATE = (
     "a block under block delete changes offsets, units, path mode, the tool or its compensation, "
-    "so later blocks depend on the switch; remove the `/`"
+    "so later blocks depend on the switch; remove the `/`, or unroll the program with --flatten and "
+    "state block_delete in the job file"
 )
 PERCENT = (
     "`%` is in the middle of the program, or not alone in its line; expected it as the first "

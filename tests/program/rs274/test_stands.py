@@ -184,5 +184,7 @@ def test_g_codes_that_move_nothing_are_stated(tmp_path: Path, controller: str) -
     ],
 )
 def test_other_g_codes_are_none_of_them(tmp_path: Path, keys: str, text: str, why: str) -> None:
-    with pytest.raises((ConfigError, ProgramError), match=re.escape(why)):
+    with pytest.raises((ConfigError, ProgramError), match=re.escape(why)) as caught:
         corrected(tmp_path, text + "\n", keys=f"still_g_codes = {keys}\n")
+    if isinstance(caught.value, ConfigError):
+        assert Path(caught.value.file or "").name == "machine.toml"

@@ -62,8 +62,8 @@ NGC = Language(
     profile_cycles=True, splines=True, counts_in_p=False, shared_locals=False, calls_none=True,
     increments_open=False, decimals=12, all_digits=True, counts=frozenset(), points=False,
 )  # fmt: skip
-#: Without splines, radius and angle, as other controls have the words of RS-274.
-PLAIN_NGC = replace(NGC, splines=False, work_offsets=False)
+#: Without splines, radius and angle, cycles with a profile and saved modes, as other controls have RS-274.
+PLAIN_NGC = replace(NGC, splines=False, work_offsets=False, profile_cycles=False, saved_modes=False)
 MACRO_B = Language(
     arithmetic=expressions.MACRO_B, macro_b=True, work_offsets=True, modal_variables=True, saved_modes=False,
     profile_cycles=False, splines=False, counts_in_p=True, shared_locals=True, calls_none=False,

@@ -36,7 +36,7 @@ from olp.program.rs274.codes import (
 )
 from olp.program.rs274.commands import Commands
 from olp.program.rs274.cycle_rules import CycleRules
-from olp.program.rs274.flatten.language import Language
+from olp.program.rs274.flatten.language import UNROLL, Language
 from olp.program.rs274.profiles.words import remedied, word_rows
 from olp.program.text.line_ends import split
 
@@ -245,6 +245,12 @@ class Profile(Dialect):
         """The M codes that move no axis, ten times their number."""
         return _in_tenths(self.harmless_m, self.harmless_m_tenths)
 
+    @property
+    def without_switch(self) -> str:
+        """What to do about a block under block delete that later blocks depend on."""
+        stated = f"{UNROLL} and state block_delete in the job file"
+        return f"remove the `/`, or {stated}" if self.unroller is not None else "remove the `/`"
+
     def further_names(self, number: int) -> list[str]:
         """All names of a further work offset."""
         names = [f"{name}P{number}" for name in self.further_offsets]
@@ -294,7 +300,8 @@ class Profile(Dialect):
             if known:
                 raise ConfigError(
                     f"still_g_codes of the machine file has G{known[0] / 10:g}, which the {self.name} "
-                    "profile knows; expected codes that it does not know"
+                    "profile knows; expected codes that it does not know",
+                    file=machine.file,
                 )
             profile = replace(profile, still_g=machine.still_g_codes)
         if machine.bracket_comments and self.brackets_by_option:

@@ -53,6 +53,7 @@ DIALECT = Profile(
     text=BlockText(odd_bytes=None, cr_ends_line=True, open_comments=True, outside=_OUTSIDE),
     cycles=replace(NGC_CYCLES, exact_corners=False),
     inert=_ASKS,
-    language=PLAIN_NGC,
+    # grblHAL saves modes
+    language=replace(PLAIN_NGC, saved_modes=True),
     path_mode="junction deviation of the control ($11)",
 )

@@ -18,7 +18,7 @@ from olp.program.rs274.flatten.language import PLAIN_NGC
 from olp.program.rs274.profiles.base import (
     ARC_DISTANCE,
     ISO_M,
-    NGC_M_REFUSALS,
+    M_REFUSALS,
     REFUSALS,
     Act,
     Profile,
@@ -48,7 +48,7 @@ DIALECT = Profile(
     },
     aliases={700: 200, 710: 210},
     harmless_m=ISO_M - {19},
-    m_refusals={**NGC_M_REFUSALS, 470: "repeats the program"},
+    m_refusals={**M_REFUSALS, 470: "repeats the program"},
     initial_retract=None,
     arc_distance=None,
     g52_is_g92=True,

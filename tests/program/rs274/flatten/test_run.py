@@ -344,6 +344,9 @@ def test_they_are_plain_codes_on_other_controls() -> None:
     for block in ("M70", "M72", "M73", "G70 Q1", "G71 Q1", "G72 Q1"):
         assert fanuc(f"O1\n{block}\nM30\n") == f"O1\n{block}\nM30\n"
     assert lcnc("M71\nM2\n") == "M71\nM2\n"
+    # on Mach3 they are units, and M70 is a macro of the builder
+    source = b"G71 G91.1\n#1=5\nG0 X[#1*2]\nM70\nG70\nX#1\nM30\n"
+    assert flatten(source, profile="mach3") == b"G71 G91.1\nG0 X10\nM70\nG70\nX5\nM30\n"
 
 
 # --- Macro B ------------------------------------------------------------------------------------------------
