@@ -54,6 +54,23 @@ def test_random_contours_are_what_the_control_makes_of_them(bent: Path, seed: in
     assert path.arcs.centre_mm[:, :2] - ORIGIN[:2] == pytest.approx(centres, abs=2e-5)
 
 
+def test_an_arc_may_follow_a_tool_call_that_moves_nothing(bent: Path, tmp_path: Path) -> None:
+    """The reader, which keeps positions of axes, is the judge of what unrolling writes."""
+    text = f"{HEAD}L X+10 Y+0\n{{}}CC X+20 Y+0\nC X+30 Y+0 DR-\nRND R2\nL X+45\n".encode()
+    still = tmp_path / "machine.toml"
+    for name in ("calibration.toml", "x.csv", "y.csv", "z.csv"):
+        (tmp_path / name).write_bytes(bent.with_name(name).read_bytes())
+    still.write_text("tool_change_moves = false\n" + bent.read_text())
+    call = b"TOOL CALL 2 Z S900\n"
+    plain = olp.flatten(text.replace(b"{}", b""), still)
+    assert olp.flatten(text.replace(b"{}", call), still).replace(call, b"") == plain
+    assert (
+        olp.flatten(text.replace(b"{}", b"TOOL CALL S900\n"), bent).replace(b"TOOL CALL S900\n", b"") == plain
+    )
+    with pytest.raises(ProgramError, match="an arc needs the present position"):
+        olp.flatten(text.replace(b"{}", call), bent)
+
+
 @pytest.mark.parametrize("seed", some_fast(range(6), 2))
 def test_contours_that_are_written_out_are_corrected(bent: Path, seed: int) -> None:
     result = olp.correct(contour(seed), bent, flatten=True)

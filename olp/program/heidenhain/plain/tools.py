@@ -31,8 +31,8 @@ class Radius:
         """Take the unit of a BEGIN PGM."""
         self._unit_mm = MM_PER_INCH if statement.upper.split()[-1] == b"INCH" else 1.0
 
-    def call(self, statement: Statement) -> None:
-        """Take over a TOOL CALL."""
+    def call(self, statement: Statement) -> bool:
+        """Take over a TOOL CALL; returns whether the change of the tool may have moved the axes."""
         match = TOOL_CALL.match(statement.text)
         assert match is not None
         delta = _DELTA.search(match["rest"])
@@ -43,13 +43,15 @@ class Radius:
                 code="OLP516",
             )
         if match["name"] is None and match["number"] is None and delta is None:
-            return
+            return False
         self._delta = 0.0 if delta is None else float(delta[1].replace(b" ", b"").replace(b"\t", b""))
         if match["number"] is not None:
             self._tool, self._name = int(match["number"]), b""
         elif match["name"] is not None and self._setup is not None:
             self._name = match["name"]
             self._tool = self._setup.tool_named(self._name.decode("latin-1"))
+        changed = match["name"] is not None or match["number"] is not None
+        return changed and (self._setup is None or bool(self._setup.machine.tool_change_moves))
 
     def of(self, line: int) -> float:
         """The radius in the unit of the program. Raises ProgramError where it is not known."""

@@ -126,8 +126,9 @@ class _Writing(Holes):
         if upper.startswith(b"BEGIN PGM"):
             self.radius.begin(statement)
         elif upper.startswith(b"TOOL CALL"):
-            self.radius.call(statement)
-            self.at, self.last = [NAN, NAN, NAN], None
+            moved = self.radius.call(statement)
+            # another length, and Z of the program is another one
+            self.at, self.last = [NAN, NAN, NAN] if moved else [*self.at[:2], NAN], None
         elif self.pattern_or_call(upper, entry, statement.line):
             self.last = None
             return
