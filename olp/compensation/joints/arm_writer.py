@@ -10,18 +10,20 @@ import re
 
 import numpy as np
 
+from olp.compensation.joints.arm_numbers import StatedNumbers, Wanted
 from olp.compensation.joints.arm_path import ArmPath
 from olp.compensation.joints.planning import JointLimits, JointPlan
 from olp.compensation.joints.writer import WrittenJoints
 from olp.compensation.tally import Tally
 from olp.compensation.target_arcs import SHARE, pieces_of, stated, stepped
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Index
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Vector
 from olp.core.spool import whole
 from olp.core.values import dataclass
 from olp.kinematics.carried import carried_arm
 from olp.kinematics.poses import Poses, rotation_vector, turned
+from olp.kinematics.postures import AXES
 from olp.program.robots.arcs import Bent
 from olp.program.robots.dialect import Replacement, RobotDialect
 from olp.program.robots.poses import (
@@ -35,48 +37,28 @@ from olp.program.robots.poses import (
     products,
     rotated,
 )
-from olp.program.robots.targets import NOWHERE, Part, Span, Target, Use
-from olp.program.text.numbers import MOST_DECIMALS, number, spliced, written
+from olp.program.robots.targets import NOWHERE, Part, Target, Use
+from olp.program.text.numbers import spliced
 
-#: A number that is nearer to what is wanted than this share of its last digit is right.
-_RIGHT = 0.5 + 1e-6
-#: mm and rad by which a pose is off from computing alone
-_COMPUTED = 1e-8
-#: By decimals: the last digit, and how far it goes.
-_DIGITS = tuple((10.0**-k, max(10.0**-k, _COMPUTED)) for k in range(MOST_DECIMALS + 1))
 #: Numbers of a place.
 _PLACE = 3
 #: Groups of moves that a move is compared with, where none wants the very same digits.
 _COMPARED = 8
 #: A branch that is nearer to its border than this says nothing, mm or deg.
 _BORDER = 1e-6
-#: A number in the usual form, with its decimals.
-_PLAIN = re.compile(rb"-?(?:0|[1-9]\d{0,6})(?:\.(\d{1,12}))?")
 _NAMES = re.compile(rb"[A-Za-z_]\w*")
 
 
 @dataclass(frozen=True, slots=True)
-class _Wanted:
-    """What a row wants of its target: `values` and how they are written (`texts`), how far a digit of each
-    goes, and the numbers of axes' turns."""
+class _Aim:
+    """Where a row of a `move` leads with its `target`: the point in the frame, in the units of the text, and
+    the orientation there."""
 
-    values: tuple[float, ...]
-    digits: tuple[float, ...]
-    texts: tuple[bytes, ...]
-    turns: tuple[bytes, ...]
-
-    def right_for(self, other: _Wanted) -> bool:
-        """Whether the numbers are right for another row to their last digit."""
-        near = all(
-            abs(_value(text) - value) <= _RIGHT * digit
-            for text, value, digit in zip(self.texts, other.values, self.digits, strict=True)
-        )
-        return near and self.turns == other.turns
-
-
-def _value(text: bytes) -> float:
-    """The value of a number; one that the text leaves out is zero."""
-    return float(text or b"0")
+    row: int
+    move: int
+    target: Target
+    point: Vector
+    turn: Quaternion
 
 
 def write_arm(path: ArmPath, plan: JointPlan, limits: JointLimits) -> WrittenJoints:
@@ -112,21 +94,26 @@ class _Writer:
         places, turns = self._in_frames(rows, self.held.held(poses, self.path.end[plan.move[rows]]))
         in_joints = np.array([bool(self._target_of(row).joints) for row in rows.tolist()], bool)
         self._keep_branches(rows[~in_joints])
-        by_target: dict[int, list[tuple[int, _Wanted]]] = {}
+        by_target: dict[int, list[tuple[int, Wanted]]] = {}
         edits, own = self._arcs(rows, places, turns)
-        for k, row in enumerate(rows.tolist()):
-            if row in own:
-                continue
-            if in_joints[k]:
-                wanted = self._wanted_joints(row)
-            else:
-                wanted = self._wanted(row, places[k], turns[k], shifted=bool(last[row]))
+        kept = [(k, row) for k, row in enumerate(rows.tolist()) if row not in own]
+        aims = [
+            self._aim(row, places[k], turns[k], shifted=bool(last[row]))
+            for k, row in kept
+            if not in_joints[k]
+        ]
+        wants = {
+            **self._in_joints([row for k, row in kept if in_joints[k]]),
+            **dict(zip((aim.row for aim in aims), self._in_digits(aims), strict=True)),
+        }
+        for _, row in kept:
+            wanted = wants[row]
             if last[row]:
                 by_target.setdefault(self._use(row).target, []).append((row, wanted))
             else:
                 edits += self._part(row, wanted)
-        for place, wants in by_target.items():
-            edits += self._target(self.targets.targets[place], wants)
+        for place, uses in by_target.items():
+            edits += self._target(self.targets.targets[place], uses)
         parts = np.bincount(plan.move, minlength=len(self.path))
         if not edits:
             return WrittenJoints(None, self.tally, np.ones(len(self.path), np.int64))
@@ -176,8 +163,7 @@ class _Writer:
         assert use is not None
         target = self.targets.targets[use.target]
         x, y, z = (value / unit for value in place)
-        numbers = (x, y, z, *self.dialect.turn_values(turn, self._numbers(target.turned)))
-        wanted = self._in_digits(row, target, numbers, angle_between(turn, target.turn), of)
+        (wanted,) = self._in_digits([_Aim(row, of, target, (x, y, z), turn)])
         name = self._new_name(target) if self.dialect.names_parts else ""
         a, b, c, *turned_ = wanted.texts
         return Part((a, b, c), 1.0, False, name, tuple(turned_), wanted.turns)
@@ -218,9 +204,9 @@ class _Writer:
         turns = products(products(back, of_vectors(rotation_vector(poses.rotation))), tools)
         return places.tolist(), turns.tolist()
 
-    def _wanted(self, row: int, place: Vector, turn: Quaternion, *, shifted: bool) -> _Wanted:
-        """The numbers of a target with which a row brings the tip to a place in its frame, turned so; without
-        `shifted` those of the pose itself."""
+    def _aim(self, row: int, place: Vector, turn: Quaternion, *, shifted: bool) -> _Aim:
+        """The pose of a target with which a row brings the tip to a place in its frame, turned so; without
+        `shifted` that pose itself."""
         move, use = self.moves[row], self._use(row)
         target, shift = self.targets.targets[use.target], ZERO
         if shifted:
@@ -230,86 +216,64 @@ class _Writer:
             if use.along_tool:
                 shift = rotated(turn, rotated(inverted(target.turn), shift))
         unit = self._unit(move)
-        point = [(a - b) / unit for a, b in zip(place, shift, strict=True)]
-        numbers = (*point, *self.dialect.turn_values(turn, self._numbers(target.turned)))
-        return self._in_digits(row, target, numbers, angle_between(turn, target.turn), move)
-
-    def _numbers(self, spans: tuple[Span, ...]) -> list[float]:
-        return [_value(self.data[a:b]) for a, b in spans]
+        x, y, z = ((a - b) / unit for a, b in zip(place, shift, strict=True))
+        return _Aim(row, move, target, (x, y, z), turn)
 
     def _unit(self, move: int) -> float:
         toolpath = self.program.toolpath
         return toolpath.frames[int(toolpath.frame[move])].unit_mm
 
-    def _wanted_joints(self, row: int) -> _Wanted:
-        """The numbers of a target that states joints."""
-        target = self._target_of(row)
-        unit: Array | float = self.dialect.joint_unit_deg
-        decimals = self.dialect.joint_decimals
-        if target.counts:
-            # motors go by whole steps
-            unit, decimals = 1.0 / np.array(target.counts), 0
-        axes = self.held.own(self.plan.command[row : row + 1])
+    def _in_joints(self, rows: list[int]) -> dict[int, Wanted]:
+        """What rows want of targets that state joints, by the rows."""
+        if not rows:
+            return {}
+        targets = [self._target_of(row) for row in rows]
+        axes = self.held.own(self.plan.command[rows])
         axes = self.arm.from_level(axes) if self.path.from_level else axes
-        numbers = axes[0, self.arm.columns] / unit
-        made = [
-            self._written(span, value, decimals)
-            for span, value in zip((*target.numbers, *target.turned), numbers.tolist(), strict=True)
-        ]
-        values, digits, texts = zip(*made, strict=True)
-        return _Wanted(values, digits, texts, ())
+        # motors go by whole steps
+        unit = np.array(
+            [
+                1.0 / np.array(own.counts) if own.counts else [self.dialect.joint_unit_deg] * AXES
+                for own in targets
+            ]
+        )
+        fewest = np.array([0 if target.counts else self.dialect.joint_decimals for target in targets])
+        stated = StatedNumbers.of(self.data, [(*own.numbers, *own.turned) for own in targets])
+        wanted = axes[:, self.arm.columns] / unit
+        off = np.full(wanted.shape, np.nan)
+        return dict(zip(rows, stated.written(wanted, fewest[:, None], off, [()] * len(rows)), strict=True))
 
-    def _in_digits(
-        self, row: int, target: Target, numbers: tuple[float, ...], turned_rad: float, move: int
-    ) -> _Wanted:
-        """Numbers as they are written: those that are right to their last digit keep their bytes. The words
-        of the target are those of a move."""
-        dialect, off = self.dialect, turned_rad / self.dialect.turn_unit_rad
-        made = [
-            self._written(span, value, dialect.decimals)
-            for span, value in zip(target.numbers, numbers[:_PLACE], strict=True)
-        ]
-        made += [
-            self._written(span, value, dialect.turn_decimals, off)
-            for span, value in zip(target.turned, numbers[_PLACE:], strict=True)
-        ]
-        values, digits, texts = zip(*made, strict=True)
-        return _Wanted(values, digits, texts, self._turns(row, target, move))
+    def _in_digits(self, aims: list[_Aim]) -> list[Wanted]:
+        """Numbers of targets as they are written: those that are right to their last digit keep their
+        bytes."""
+        if not aims:
+            return []
+        dialect = self.dialect
+        stated = StatedNumbers.of(self.data, [(*aim.target.numbers, *aim.target.turned) for aim in aims])
+        wanted = np.array(
+            [
+                (*aim.point, *dialect.turn_values(aim.turn, own))
+                for aim, own in zip(aims, stated.values[:, _PLACE:].tolist(), strict=True)
+            ]
+        )
+        off = np.full(wanted.shape, np.nan)
+        off[:, _PLACE:] = [[angle_between(aim.turn, aim.target.turn) / dialect.turn_unit_rad] for aim in aims]
+        fewest = np.full(wanted.shape[1], dialect.turn_decimals)
+        fewest[:_PLACE] = dialect.decimals
+        return stated.written(wanted, fewest, off, [self._turns(aim) for aim in aims])
 
-    def _written(
-        self, span: Span, value: float, fewest: int, off: float | None = None
-    ) -> tuple[float, float, bytes]:
-        """The value of a number, its last digit, and how it is written in place of another one, which is
-        `off` by so much."""
-        text = self.data[span[0] : span[1]]
-        plain, form = _PLAIN.fullmatch(text), None
-        if plain is not None:
-            own = len(plain[1] or b"")
-        else:
-            form = number(text)
-            if form is None or form.letter:
-                form = number(b"0.0")
-            own = 0 if form is None else form.decimals
-        decimals = min(max(fewest, own), MOST_DECIMALS)
-        digit, least = _DIGITS[decimals]
-        if (abs(_value(text) - value) if off is None else off) <= max(_RIGHT * digit, _COMPUTED):
-            return _value(text), least, text
-        if form is None and abs(value) > digit:
-            return value, least, b"%.*f" % (decimals, value)
-        form = form or number(text)
-        assert form is not None
-        return value, least, written(form, value, decimals)
-
-    def _turns(self, row: int, target: Target, move: int) -> tuple[bytes, ...]:
-        if not target.turns:
+    def _turns(self, aim: _Aim) -> tuple[bytes, ...]:
+        if not aim.target.turns:
             return ()
-        return self.dialect.turn_texts(self.program, target, self.nominal[move], self.commands[row])
+        return self.dialect.turn_texts(
+            self.program, aim.target, self.nominal[aim.move], self.commands[aim.row]
+        )
 
     # -- edits ---------------------------------------------------------------------------------------
 
-    def _target(self, target: Target, wants: list[tuple[int, _Wanted]]) -> list[Replacement]:
+    def _target(self, target: Target, wants: list[tuple[int, Wanted]]) -> list[Replacement]:
         """New numbers of a target, and declarations of its own for each further group of moves."""
-        groups: list[tuple[_Wanted, list[int]]] = []
+        groups: list[tuple[Wanted, list[int]]] = []
         known: dict[tuple[tuple[bytes, ...], tuple[bytes, ...]], list[int]] = {}
         for row, wanted in wants:
             key = wanted.texts, wanted.turns
@@ -330,7 +294,7 @@ class _Writer:
                 edits += self._cloned(target, wanted, rows)
         return edits
 
-    def _edited(self, target: Target, wanted: _Wanted) -> list[Replacement]:
+    def _edited(self, target: Target, wanted: Wanted) -> list[Replacement]:
         spans = (*target.numbers, *target.turned, *target.turns)
         return [
             (a, b, text)
@@ -338,7 +302,7 @@ class _Writer:
             if text != self.data[a:b]
         ]
 
-    def _cloned(self, target: Target, wanted: _Wanted, rows: list[int]) -> list[Replacement]:
+    def _cloned(self, target: Target, wanted: Wanted, rows: list[int]) -> list[Replacement]:
         start = target.value[0]
         numbers = [(a - start, b - start, text) for a, b, text in self._edited(target, wanted)]
         name = self._new_name(target)
@@ -352,7 +316,7 @@ class _Writer:
         self.clones += 1
         return edits
 
-    def _part(self, row: int, wanted: _Wanted) -> list[Replacement]:
+    def _part(self, row: int, wanted: Wanted) -> list[Replacement]:
         """The statement of a part of a move before its end."""
         move, use = self.moves[row], self._use(row)
         target = self.targets.targets[use.target]
@@ -370,7 +334,10 @@ class _Writer:
         if self.held.track is None or target.along == NOWHERE:
             return b""
         value = float(self.plan.command[row, self.held.column])
-        text = self._written(target.along, value, self.dialect.decimals)[2]
+        stated = StatedNumbers.of(self.data, [[target.along]])
+        fewest = np.array([self.dialect.decimals])
+        (wanted,) = stated.written(np.array([[value]]), fewest, np.full((1, 1), np.nan), [()])
+        (text,) = wanted.texts
         return b"" if text == self.data[slice(*target.along)] else text
 
     def _new_name(self, target: Target) -> str:
