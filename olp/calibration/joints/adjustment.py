@@ -204,9 +204,9 @@ def adjusted(model: Model, starts: Sequence[Start], most: int = _STEPS) -> Joint
     before, longest = np.inf, _LONGEST * model.prior
     base, least = (theta, owns), np.inf
     for number in range(most):
-        blocks = [block_of(model, theta, start, own) for start, own in zip(starts, owns, strict=True)]
+        blocks = _blocks(model, theta, starts, owns, closes=number == 0)
         score = _score(blocks, theta, owns) + float(theta @ precision @ theta)
-        if number >= _FREE and score > least + _SETTLED:
+        if not blocks or (number >= _FREE and score > least + _SETTLED):
             theta = 0.5 * (base[0] + theta)
             owns = [0.5 * (one + other) for one, other in zip(base[1], owns, strict=True)]
             continue
@@ -254,10 +254,23 @@ def adjusted(model: Model, starts: Sequence[Start], most: int = _STEPS) -> Joint
     )
 
 
+def _blocks(
+    model: Model, theta: Array, starts: Sequence[Start], owns: Sequence[Array], *, closes: bool
+) -> list[Block]:
+    """The rows of all instruments about theta; none where a platform does not close there. Raises
+    CannotCompute in that case where it `closes`."""
+    try:
+        return [block_of(model, theta, start, own) for start, own in zip(starts, owns, strict=True)]
+    except CannotCompute:
+        if closes:
+            raise
+        return []
+
+
 def _score(blocks: Sequence[Block], theta: Array, owns: Sequence[Array]) -> float:
     """Chi-square of the rows of instruments about unknowns theta (k,) and those of their own."""
     total = 0.0
-    for block, own in zip(blocks, owns, strict=True):
+    for block, own in zip(blocks, owns, strict=bool(blocks)):
         (chunk,) = block.chunks()
         total += float(np.sum(((chunk.y - chunk.rows @ theta - chunk.local @ own) / chunk.sigma) ** 2))
     return total

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,13 +12,14 @@ from calibration.joints.simulated import SIGMA, TOOL, read, true_machine
 from cases.fast import some_of_a_campaign
 from cases.joint_campaigns import Campaign
 
+from olp.calibration.joints import adjustment
 from olp.calibration.joints.adjustment import JointFit, fit_joints, held_out
 from olp.calibration.joints.candidates import Priors
 from olp.calibration.joints.findings import fit_or_refuse, joint_findings
 from olp.calibration.joints.readings import Points
 from olp.calibration.joints.unknowns import model_of
 from olp.core.arrays import Array
-from olp.core.errors import ConfigError
+from olp.core.errors import CannotCompute, ConfigError
 from olp.core.rigid_fit import fit_points
 from olp.kinematics.errors import Mass, Payload
 
@@ -209,3 +211,22 @@ def test_mistakes_are_told(how: str, words: str) -> None:
         return
     told = [finding.message for finding in joint_findings(fit, [wrong]) if finding.code == "OLP810"]
     assert words in " ".join(told)
+
+
+@pytest.mark.slow
+def test_a_step_to_where_a_platform_does_not_close_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, theta, values = true_machine("xyzac_trunnion", 0, 12)
+    readings = [read("points", model.machine(theta).actual(values), values)]
+    plain, calls = fit_joints(model, readings), list[int]()
+    own = adjustment.block_of
+
+    def sometimes(*words: Any) -> Any:
+        calls.append(0)
+        if len(calls) == 2:
+            raise CannotCompute("the legs do not close")
+        return own(*words)
+
+    monkeypatch.setattr(adjustment, "block_of", sometimes)
+    halved = fit_joints(model, readings)
+    assert len(calls) > 3
+    assert np.abs(halved.theta - plain.theta).max() < 0.01 * plain.sigma.max()

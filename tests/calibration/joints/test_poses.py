@@ -88,7 +88,7 @@ def test_the_verb_writes_a_program_of_postures(tmp_path: Path) -> None:
         ("tripod", 1.0),
         ("linear-delta", 5.0),
         pytest.param("hexapod", 5.0, marks=pytest.mark.slow),
-        pytest.param("rotary-delta", 100.0, marks=pytest.mark.slow),
+        pytest.param("rotary-delta", 100.0, marks=pytest.mark.campaign),
     ],
 )
 def test_random_postures_of_a_platform_are_poses_that_it_reaches(
