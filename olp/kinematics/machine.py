@@ -46,7 +46,8 @@ class JointMachine:
 class JointCalibration:
     """A calibration file: the errors, and the calibrated values of each axis in mm or deg. Its standard
     uncertainties grow by `growth_per_year`, a share. `payload` was on while measuring, where the errors do
-    not say what a payload bends."""
+    not say what a payload bends. `misfit_mm` is the standard deviation of each coordinate of the tip by what
+    the errors do not explain."""
 
     errors: MachineErrors
     box: Mapping[str, tuple[float, float]]
@@ -56,3 +57,4 @@ class JointCalibration:
     datum_mm: Vector = ZERO
     growth_per_year: float = 0.0
     payload: Payload = Payload()
+    misfit_mm: float = 0.0

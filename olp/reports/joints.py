@@ -148,6 +148,7 @@ def uncertainty_rows(report: Report) -> list[tuple[str, str]]:
         ("Frame", "beside one shift and turn of all poses, which the work offset takes up"),
         ("From", f"{part['source']}, at {part['waypoints']} waypoints"),
         ("Age", "" if part["growth_by_age"] == 1.0 else f"times {part['growth_by_age']:.3g}"),
+        ("Misfit", f"{number(part['misfit_um'])} um in each coordinate" if part["misfit_um"] else ""),
     ]
 
 

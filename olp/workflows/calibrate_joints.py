@@ -58,7 +58,7 @@ class FittedJoints(Filed):
         )
         model = self.fit.model
         known = JointCovariance(model.unknowns, self.fit.covariance, lines_of(model.structure))
-        return joint_calibration_files(target, values, known, notes=notes)
+        return joint_calibration_files(target, values, known, notes=notes, misfit_mm=self.fit.misfit_mm)
 
 
 def fit_joint_calibration(
@@ -165,15 +165,9 @@ def _at_postures(fit: JointFit) -> tuple[Array, Array]:
 
 
 def _with_misfit(fit: JointFit, place: Array) -> float:
-    """mm by which a tip is expected to be off (rms): (n,) the uncertainties of the unknowns, and what the
-    readings show beyond these and their own noise, which no unknown explains."""
-    rows = [source.off_mm**2 / min(source.residual.shape[1], 3) for source in fit.sources]
-    noise = [
-        np.full(len(part), source.start.reading.sigma**2)
-        for part, source in zip(rows, fit.sources, strict=True)
-    ]
-    beyond = float(np.mean(np.concatenate(rows) - np.concatenate(noise)))
-    return float(np.sqrt(np.mean(place**2) + 3.0 * max(beyond, 0.0)))
+    """mm by which a tip is expected to be off (rms): (n,) the uncertainties of the unknowns, and what none of
+    these explains."""
+    return float(np.sqrt(np.mean(place**2) + 3.0 * fit.misfit_mm**2))
 
 
 def _figures(off_mm: Array) -> dict[str, float]:

@@ -102,6 +102,22 @@ def _worst(drawn: np.ndarray) -> np.ndarray:
     return np.array([np.sqrt(np.linalg.eigvalsh(one)[-1]) for one in spread])
 
 
+def test_what_numbers_do_not_explain_is_part_of_every_band(
+    known: tuple[Path, np.ndarray, np.ndarray], tmp_path: Path
+) -> None:
+    """3 um of each coordinate, in quadrature."""
+    stated = f'[covariance]\nfile = "{known[0].parent.as_posix()}/c.npz"\nmisfit_um = 3.0\n'
+    machine = machine_of(tmp_path, known[1], stated)
+    without, more = (
+        olp.correct_joints(LIST.encode(), one).report["uncertainty"] for one in (known[0], machine)
+    )
+    assert (without["misfit_um"], more["misfit_um"]) == (0.0, 3.0)
+    added = np.hypot(without["band_um"]["max_um"], more["coverage_factor"] * 3.0)
+    assert more["band_um"]["max_um"] == pytest.approx(added, rel=1e-9)
+    assert more["band_urad"] == without["band_urad"]
+    assert more["expected"]["after_rms_um"] > 3.0 * np.sqrt(3.0)
+
+
 @pytest.mark.slow
 def test_what_is_stated_is_what_drawn_machines_do(
     known: tuple[Path, np.ndarray, np.ndarray], tmp_path: Path

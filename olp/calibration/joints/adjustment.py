@@ -94,6 +94,18 @@ class JointFit:
         return np.sqrt(np.diag(self.covariance))
 
     @property
+    def misfit_mm(self) -> float:
+        """Standard deviation of a coordinate by what readings show beyond their noise and the unknowns."""
+        rows = [source.off_mm**2 / min(source.residual.shape[1], 3) for source in self.sources]
+        noise = [
+            np.full(len(part), source.start.reading.sigma**2)
+            for part, source in zip(rows, self.sources, strict=True)
+        ]
+        # unknowns take a part of the noise up
+        share = sum(source.residual.size for source in self.sources) / self.freedom
+        return float(np.sqrt(max(np.mean(share * np.concatenate(rows) - np.concatenate(noise)), 0.0)))
+
+    @property
     def score(self) -> float:
         """Chi-square of readings and unknowns together."""
         return self.chi_square + float(self.theta @ self.model.precision @ self.theta)

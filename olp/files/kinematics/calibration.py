@@ -11,7 +11,7 @@ import numpy as np
 from olp.core.errors import ConfigError, InputError
 from olp.core.interpolation import Interpolant
 from olp.core.machine import Vector
-from olp.core.units import shifted
+from olp.core.units import MM_PER_UM, shifted
 from olp.files.kinematics.calibration_schema import (
     ElasticityTable,
     HarmonicTable,
@@ -68,6 +68,7 @@ def load_joint_calibration(
         file.datum_mm,
         file.covariance.growth_per_year,
         Payload(file.payload_kg, file.payload_centre_mm),
+        file.covariance.misfit_um * MM_PER_UM,
     )
 
 

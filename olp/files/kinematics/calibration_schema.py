@@ -133,6 +133,11 @@ class JointCovarianceTable(Table):
         description="the growth of standard uncertainties per year after measured, as a share: 0.5 makes "
         "them half as large again",
     )
+    misfit_um: NotNegative = Field(
+        default=0.0,
+        description="the standard deviation of each coordinate of the tip by what the numbers do not "
+        "explain, such as curves, cyclic errors and play, as olp calibrate fit found it in its readings",
+    )
 
 
 class JointCalibrationFile(Table):

@@ -11,6 +11,7 @@ from typing import Any
 
 from olp.calibration.joints.adjustment import JointFit
 from olp.calibration.joints.candidates import Unknown
+from olp.core.units import MM_PER_UM
 from olp.files.fields import SIGN
 from olp.files.kinematics.covariance import JointCovariance, joint_covariance_bytes
 from olp.files.kinematics.numbers import number_of, put_number
@@ -19,6 +20,8 @@ from olp.files.write import PathLike
 
 #: A table of numbers by name of the axis: a value of the file, no table.
 _INLINE = "box"
+#: Decimals of a misfit, um.
+_DECIMALS = 3
 
 
 def fitted_values(
@@ -91,8 +94,10 @@ def joint_calibration_files(
     known: JointCovariance | None,
     growth_per_year: float = 0.0,
     notes: Sequence[str] = (),
+    misfit_mm: float = 0.0,
 ) -> dict[Path, bytes]:
-    """The bytes of an olp-calibration-1 file and of its covariance beside it; notes become comments."""
+    """The bytes of an olp-calibration-1 file and of its covariance beside it; notes become comments.
+    `misfit_mm` is what its numbers do not explain."""
     path = Path(target)
     if known is None:
         return {path: joint_calibration_text(values, notes)}
@@ -100,6 +105,8 @@ def joint_calibration_files(
     stated: dict[str, Any] = {"file": archive.name}
     if growth_per_year:
         stated["growth_per_year"] = growth_per_year
+    if misfit_mm:
+        stated["misfit_um"] = round(misfit_mm / MM_PER_UM, _DECIMALS)
     text = joint_calibration_text({**values, "covariance": stated}, notes)
     return {path: text, archive: joint_covariance_bytes(known, values)}
 

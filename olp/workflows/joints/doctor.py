@@ -76,7 +76,12 @@ class DiagnosedJoints(Filed):
         notes = [f"{finding.code}: {finding.message}" for finding in self.findings]
         absent = known is not None and not factors.all()
         return joint_calibration_files(
-            target, values, None if absent else known, self.stated.growth_per_year, notes
+            target,
+            values,
+            None if absent else known,
+            self.stated.growth_per_year,
+            notes,
+            self.stated.misfit_mm,
         )
 
 

@@ -65,7 +65,7 @@ class RefinedJoints(Filed):
         changes = zip(fit.model.unknowns, fit.theta.tolist(), strict=True)
         values = changed_values(self.values, changes, self.day, (self.calibration, target))
         known = JointCovariance(self.known.unknowns, fit.covariance, self.known.lines)
-        return joint_calibration_files(target, values, known, self.growth_per_year, notes)
+        return joint_calibration_files(target, values, known, self.growth_per_year, notes, fit.misfit_mm)
 
 
 def refine_joint_calibration(

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +33,7 @@ _MOST = 5000
 _LINES = 10
 NOT_INCLUDED = (
     "one shift and one turn of all poses, which the work offset takes up: how well that is set is not in it",
-    "curves, cyclic errors and play: the covariance of the calibration is that of its lines and zeros",
+    "curves, cyclic errors and play beyond what readings of the calibration showed of them at other postures",
     "what the control does between blocks, forces, and the process",
 )
 
@@ -40,18 +41,21 @@ NOT_INCLUDED = (
 @dataclass(frozen=True, slots=True, eq=False)
 class Known:
     """What a calibration states of its uncertainty on the day of the run: the model with the covariance, its
-    file, and by how much standard uncertainties have grown."""
+    file, and by how much standard uncertainties have grown. `misfit_mm` is the standard deviation of each
+    coordinate by what its numbers do not explain."""
 
     model: Model
     source: str
     growth: float
+    misfit_mm: float
 
     def spread(self, run: JointRun, path: JointPath, axes: Array, tool: Index) -> PoseSpread:
         """That of poses at axis values (n, axes) with tools (n,) of the motion."""
         from olp.uncertainty.poses import pose_spread
 
         tools = np.array([machine.tool_mm for machine in path.motion.machines])
-        return pose_spread(self.model, axes, tools[tool], run.errors.payload)
+        spread = pose_spread(self.model, axes, tools[tool], run.errors.payload)
+        return replace(spread, tip=spread.tip + self.misfit_mm**2 * np.eye(3))
 
     def bands_um_urad(self, run: JointRun, path: JointPath, moves: Index) -> tuple[Index, Array, Array]:
         """(n,) lines of moves, at most so many as are looked at, and the bands of tip and tool at their
@@ -81,7 +85,7 @@ def known_of(run: JointRun, date: datetime.date | None) -> Known | None:
         structure, known.unknowns, calibration.errors.masses, calibration.datum_mm, base=calibration.errors,
         known=known.covariance * growth**2,
     )  # fmt: skip
-    return Known(model, values["covariance"]["file"], growth)
+    return Known(model, values["covariance"]["file"], growth, calibration.misfit_mm)
 
 
 def uncertainty_of(
@@ -111,6 +115,7 @@ def uncertainty_of(
         "coverage_factor": COVERAGE,
         "source": known.source,
         "growth_by_age": known.growth,
+        "misfit_um": known.misfit_mm * UM_PER_MM,
         "waypoints": len(looked),
         "band_um": figures(tip, "um"),
         "band_urad": figures(turn, "urad"),
