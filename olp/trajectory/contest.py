@@ -32,9 +32,9 @@ _ROUNDING = 1e-9
 #: share of the time that optimising has to gain
 _GAIN = 0.003
 #: share of the time that a search in a tube has to gain to be made again from its end ...
-_AGAIN = 1e-2
+_AGAIN = 5e-3
 #: ... and how often it is made
-_SEARCHES = 5
+_SEARCHES = 3
 #: share of the time that jerk costs in closed form which optimising does not recover
 _JERK_COST = 0.1
 #: exceptions of a solver that fails

@@ -50,7 +50,7 @@ _NOTHING = 1e-12
 #: multipliers are at most so much above or below those of the barrier
 _APART = 1e3
 #: steps at most
-_STEPS = 80
+_STEPS = 160
 #: steps of no length at most
 _STUCK = 4
 #: change of the time, relative, below which the search ends ...
