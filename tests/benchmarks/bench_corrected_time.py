@@ -6,8 +6,8 @@
 Prints the re-timed seconds of the nominal and of the corrected program, and by how much the corrected one is
 slower in percent. Jobs of machines that re-timing does not take are named with its reason.
 
-`--circles` plans circles of mm radius at mm/s feed with um path tolerance, as chords, without and with the steps
-of a correction for 5 um of backlash.
+`--circles` plans circles of mm radius at mm/s feed with um path tolerance, as chords, without and with the
+steps of a correction for 5 um of backlash.
 """
 
 from __future__ import annotations
