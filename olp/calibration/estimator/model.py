@@ -3,7 +3,7 @@ terms, and where displacements were measured. Most of it follows from lines, as 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -193,20 +193,25 @@ def _shapes(
     """The shape of every component with lines: the features of each by itself, then again where others have
     their steps; then the scales of all curves of a class."""
     found: dict[str, Features] = {}
+    # angles first: a reflector on the table reads their steps, too
+    order = sorted(COMPONENTS, key=lambda name: name[1] in AXES)
     for again in (False, True):
-        for k, name in enumerate(COMPONENTS):
-            tell("shapes of curves", (k + again * len(COMPONENTS)) / (2 * len(COMPONENTS)))
+        for k, name in enumerate(order):
+            tell("shapes of curves", (k + again * len(order)) / (2 * len(order)))
             own = _own_lines(name, lines)
-            others = [one for other, one in found.items() if other[2] == name[2] and other != name]
-            joints = sorted(
-                {f for one in others for f in one.features if isinstance(f, Step)},
-                key=lambda step: step.low_mm,
-            )
+            steps = {
+                other: [f for f in one.features if isinstance(f, Step)]
+                for other, one in found.items()
+                if other[2] == name[2] and other != name
+            }
+            joints = _all_of(steps.values())
+            turns = _all_of(some for other, some in steps.items() if other[1] not in AXES)
             if own and (joints or not again):
                 spline = splines[AXES.index(name[2])]
                 found[name] = features_of(
-                    own, spline, _half(spline), waves.get(name, ()), joints if again else ()
-                )
+                    own, spline, _half(spline), waves.get(name, ()),
+                    joints if again else (), turns if again and _on_table(own) else (),
+                )  # fmt: skip
 
     def hides(name: str, scales: Scales) -> Hidden:
         axis = AXES.index(name[2])
@@ -214,6 +219,14 @@ def _shapes(
         return hidden(_own_lines(name, lines), splines[axis], scales, amplitude, datum_mm[axis])
 
     return shapes_of(found, hides)
+
+
+def _on_table(lines: Sequence[tuple[Line, Noise]]) -> bool:
+    return any(line.reference == "table" and line.quantity != "angle" for line, _ in lines)
+
+
+def _all_of(steps: Iterable[Sequence[Step]]) -> list[Step]:
+    return sorted({step for some in steps for step in some}, key=lambda step: step.low_mm)
 
 
 def _waves(

@@ -70,9 +70,11 @@ def features_of(
     half_spline: Spline,
     waves: Sequence[Wave] = (),
     joints: Sequence[Step] = (),
+    turns: Sequence[Step] = (),
 ) -> Features:
     """The features of the curve that all these lines read, beside what repeats with `waves`. At `joints`
-    other errors of the axis have a step."""
+    other errors of the axis have a step. At `turns` an angle has one that lines on the table read with their
+    lever arm: so the curve may have one, too, that they do not show."""
     kind = lines[0][0].quantity
     angle = kind == "angle"
     inside = [line for line, _ in lines if np.ptp(line.target_mm) > 0.2 * (spline.high_mm - spline.low_mm)]
@@ -91,7 +93,7 @@ def features_of(
             table.append(line.direction[:, None] * half_spline.values(q))
         normal.add(_block(np.concatenate(table, axis=1), line, noise, waves, FEATURE[angle]))
     evidence = Evidence(normal, spline, AMPLITUDE[angle], FEATURE[angle])
-    chosen: list[int] = []
+    chosen = [i for i in range(len(tried)) if _is_joint(tried[i], turns)][:MOST]
     while len(chosen) < min(MOST, len(tried)):
         rest = [i for i in range(len(tried)) if i not in chosen]
         at_joint = np.array([_is_joint(tried[i], joints) for i in rest])
