@@ -1,11 +1,14 @@
-"""Blocks of canned cycles, carried out many at once: those of one cycle, in one frame, one behind the other.
+"""Blocks of canned cycles, carried out many at once: series in one frame, with the straight moves between.
 
 What a series keeps goes over from one such run to the next. The strokes of holes are in `strokes`.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, is_in
 from olp.core.budget import Budget
@@ -17,9 +20,11 @@ from olp.program.holes import CHANGED, Holes
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.codes import CYCLES, INVERSE_TIME, RETRACT_TO_R
 from olp.program.rs274.collector import Collector
-from olp.program.rs274.cycle_runs import CycleRun, CycleWords, Refused
+from olp.program.rs274.cycle_runs import CycleRun, Refused
 from olp.program.rs274.cycles import HOLE_STROKES, LCNC_CLEARANCE_MM, MOST_REPEATS, levels, repeats_error
 from olp.program.rs274.modes import Context, scaled
+from olp.program.rs274.motion import fill
+from olp.program.rs274.rows import Rows
 from olp.program.rs274.state import BROKEN_SERIES, KNOWN_BY, NAN, OPEN_RETRACT, TURNED_SERIES
 from olp.program.rs274.strokes import Drilling, Step, Strokes, strokes
 from olp.program.rs274.turned import Turning
@@ -54,12 +59,13 @@ class CycleBlocks:
         first = max(self._line + 1 - context.chunk.first_line, 0)
         return self._line < 0 or not CYCLES.issuperset(context.motion[first:row].tolist())
 
-    def run(self, context: Context, words: CycleWords, line: Index, frame: int) -> None:
-        """Carry out the blocks on lines (n,) of the chunk, in this frame, which are one run of `runs`, of
-        whose `words` theirs are. Raises ProgramError for the first that cannot be carried out."""
-        state, collector = self._state, self._collector
-        run = CycleRun.of(context, words, line, scaled(context, state, collector.remarks))
-        refused = Refused(context, line)
+    def run(self, context: Context, rows: Rows, some: slice) -> None:
+        """Carry out some rows, which are one or more of `runs` with the moves between them. Raises
+        ProgramError for the first block that cannot be carried out."""
+        state, frame = self._state, int(rows.frame[some.start])
+        value = scaled(context, state, self._collector.remarks)
+        run = CycleRun.of(context, rows.cycles, rows.blocks.line[some], value)
+        refused = Refused(context, run.line)
         self._turning = Turning.of(state.frames[frame].turn)
         self._check_modes(context, run, refused)
         self._begin(context, run, frame, refused)
@@ -77,17 +83,21 @@ class CycleBlocks:
         count = min(refused.row, self._affordable(np.where(times > 0, times, 0) * HOLE_STROKES))
         of = np.repeat(np.arange(count), times[:count])
         of = of[: self._affordable(HOLE_STROKES + drilling.pecks[of])] if refused.row else of[:0]
-        place = self._places(run, frame, of)
-        holes = drilling.pick(of)
-        made = self._strokes(context, run, holes, place, of) if of.size else None
-        if made is not None:
+        end = self._ends(run, rows.blocks.slot[some], frame)
+        place, holes = self._places(run, frame, of, end), drilling.pick(of)
+        start = np.vstack((self._along(np.array(state.position)), end[run.row[run.first[1:]] - 1]))
+        initial, to_r = self._initials(run, drilling, start), context.retract[run.line[of]] == RETRACT_TO_R
+        levels = drilling.level(initial)
+        made = strokes(holes, start, run.series[of], place, to_r, levels, beside=self._beside())
+        # zero repeats make none: the words are kept for the blocks that follow
+        if of.size:
             self._spend(made, of, refused)
         refused.raise_first()
-        if made is None:
-            # zero repeats: the words are kept for the blocks that follow
-            self._moves = collector.moves
-            return
-        self._put(context, run, frame, holes, place, of, times, counter, made)
+        self._collector.holes.append(
+            self._holes(context, run, holes, place, of, times, counter, levels, made)
+        )
+        self._put(context, run, rows, some, end, of, made)
+        state.series.go_on(len(run.first) - 1, float(initial[-1]))
 
     def _wanting(self, run: CycleRun) -> bool:
         """Whether a position is not known and the first block does not state it: in G90 it may state a place
@@ -101,35 +111,36 @@ class CycleBlocks:
 
     def _check_modes(self, context: Context, run: CycleRun, refused: Refused) -> None:
         """Refuse modes in which the control makes no cycle."""
-        state, code, line = self._state, run.code, run.line
-        turning = state.profile.cycles.turning.get(code)
-        name, other = f"the cycle G{code / 10:g}", run.other
+        state, line, name, other = self._state, run.line, run.name, run.other
         if not state.profile.cycles.other_axes:
             refused.where(
                 other > 0,
                 lambda i: ProgramError(
-                    f"{name} moves {chr(other[i])} too, which the control refuses; move it in a block of its "
-                    "own",
+                    f"{name(i)} moves {chr(other[i])} too, which the control refuses; move it in a block of "
+                    "its own",
                     code="OLP518",
                 ),
             )
-        inverse = np.asarray(context.feed_mode[line] == INVERSE_TIME)
-        refused.where(inverse, f"{name} is in inverse time (G93); give G94 before it", "OLP518")
+        refused.where(
+            np.asarray(context.feed_mode[line] == INVERSE_TIME),
+            lambda i: ProgramError(f"{name(i)} is in inverse time (G93); give G94 before it", code="OLP518"),
+        )
         if state.compensation is not None:
-            refused.all(f"{name} is in cutter compensation; give G40 before it", "OLP518")
+            refused.all(f"{name(0)} is in cutter compensation; give G40 before it", "OLP518")
         if self._turning is not None and not self._turning.keeps_axis(PLANES[run.plane][2]):
             refused.all(
-                f"{name} is in a frame that turns, mirrors or scales its tool axis; end that before it",
+                f"{name(0)} is in a frame that turns, mirrors or scales its tool axis; end that before it",
                 "OLP518",
             )
         open_return = OPEN_RETRACT
         if modes := state.profile.return_modes:
             open_return = f"a canned cycle has no return mode; give {' or '.join(f'M{m}' for m in modes)}"
         refused.where(np.asarray(context.retract[line] < 0), open_return, "OLP532")
-        if turning is not None:
+        for code, turning in state.profile.cycles.turning.items():
             spindle = " or ".join(f"M{m}" for m in turning)
-            still = ~is_in(context.spindle[line], turning)
-            refused.where(still, f"{name} needs a turning spindle; give {spindle} before it", "OLP518")
+            still = (run.code == code) & ~is_in(context.spindle[line], turning)
+            why = f"the cycle G{code / 10:g} needs a turning spindle; give {spindle} before it"
+            refused.where(still, why, "OLP518")
 
     def _begin(self, context: Context, run: CycleRun, frame_index: int, refused: Refused) -> None:
         """Begin a series with the first of the blocks, or go on with one."""
@@ -144,12 +155,12 @@ class CycleBlocks:
             series.broken |= self._moves != self._collector.moves
             if series.broken and not rules.keeps_numbers:
                 refused.all(BROKEN_SERIES, "OLP518")
-            if self._code != run.code and rules.new_code_forgets:
+            if self._code != run.code[0] and rules.new_code_forgets:
                 series.held = {}
         if state.profile.return_level:
             self._begin_at_level(run, refused)
         self._line, self._frame = context.chunk.first_line + int(run.line[-1]), frame_index
-        self._code = run.code
+        self._code = int(run.code[-1])
 
     def _begin_at_level(self, run: CycleRun, refused: Refused) -> None:
         """The series returns to the level that a code of the control states."""
@@ -181,7 +192,7 @@ class CycleBlocks:
         if letter := state.profile.cycles.first_peck:
             peck = np.where(np.isnan(peck), run.number(letter), peck)
         r, z, q, p = (
-            self._inherited(letter, given)
+            self._inherited(run, letter, given)
             for letter, given in (
                 ("R", run.number("R")), (depth, run.number(depth)), ("Q", peck),
                 ("P", dwell),
@@ -191,7 +202,7 @@ class CycleBlocks:
         refused.where(
             lacking[0][1] | lacking[1][1],
             lambda i: ProgramError(
-                f"the cycle G{run.code / 10:g} has no "
+                f"{run.name(i)} has no "
                 f"{' and no '.join(letter for letter, lacks in lacking if lacks[i])} word; give it",
                 code="OLP531",
             ),
@@ -207,7 +218,8 @@ class CycleBlocks:
         """Take over the levels that the series has of G90 where G91 is in force now, or the other way round;
         refuse them where what they are then is not known."""
         series, rules = self._state.series, self._state.profile.cycles
-        held, stated = series.held, [run.slot[letter] >= 0 for letter in ("R", depth)]
+        held, own = series.held, run.series == 0
+        stated = [run.slot[letter][own] >= 0 for letter in ("R", depth)]
         turned = rules.levels_follow_distance and series.incremental is not run.incremental
         if not turned or held.keys().isdisjoint(("R", depth)) or (stated[0][0] and stated[1][0]):
             series.incremental = run.incremental
@@ -224,16 +236,19 @@ class CycleBlocks:
         initial = self._state.series.initial
         return NAN if initial is None else initial
 
-    def _inherited(self, letter: str, given: Array) -> Array:
+    def _inherited(self, run: CycleRun, letter: str, given: Array) -> Array:
         """(n,) the numbers of a word, those of the blocks before where a block has none; NaN where none."""
         held = self._state.series.held
         before, missing = held.get(letter), np.isnan(given)
-        inherited = NAN if before is None else before
-        if missing.all():
-            return np.full(len(given), inherited)
-        source = np.maximum.accumulate(np.where(missing, -1, np.arange(len(given))))
-        number = np.where(source >= 0, given[source], inherited)
-        held[letter] = float(number[-1])
+        number = np.where(run.series > 0, NAN, NAN if before is None else before)
+        if len(run.first) > 1:
+            held.pop(letter, None)
+        if not missing.all():
+            source = np.maximum.accumulate(np.where(missing, -1, np.arange(len(given))))
+            known = source >= run.first[run.series]
+            number[known] = given[source[known]]
+            if known[-1]:
+                held[letter] = float(number[-1])
         return number
 
     def _times(self, context: Context, run: CycleRun, counter: Index, refused: Refused) -> Index:
@@ -274,32 +289,33 @@ class CycleBlocks:
         """How many of the first that may be paid for, and one more, which is refused then."""
         return int(np.searchsorted(np.cumsum(cost), self._budget.left, "right")) + 1
 
-    def _places(self, run: CycleRun, frame_index: int, of: Index) -> Array:
-        """(h, 2) where holes of blocks (h,) are, along the first and second axis of the plane."""
-        frame = self._state.frames[frame_index]
-        offset, place = self._along(np.array(frame.offset_mm)), np.empty((len(of), 2))
-        position = self._along(np.array(self._state.position))
-        for column, axis in enumerate(PLANES[run.plane][:2]):
-            to = run.number("XYZ"[axis])[of] * frame.unit_mm
-            before = float(position[axis])
-            if run.incremental:
-                place[:, column] = np.cumsum(np.concatenate(([before], np.nan_to_num(to))))[1:]
-            else:
-                source = np.maximum.accumulate(np.where(np.isnan(to), -1, np.arange(len(of))))
-                place[:, column] = np.where(source >= 0, to[source] + offset[axis], before)
-        return place
+    def _ends(self, run: CycleRun, slot: Index, frame_index: int) -> Array:
+        """(m, 3) where the rows of runs in G90 end along the words, those of holes in the plane only. `slot`
+        (m, 3) are the words."""
+        frame, position = self._state.frames[frame_index], self._along(np.array(self._state.position))
+        offset = self._along(np.array(frame.offset_mm))
+        return fill(slot, run.value, None, offset, frame.unit_mm, position.tolist())
+
+    def _places(self, run: CycleRun, frame_index: int, of: Index, end: Array) -> Array:
+        """(h, 2) where holes of blocks (h,) are, along the first and second axis of the plane, of the `end`
+        (m, 3) of all rows."""
+        plane = list(PLANES[run.plane][:2])
+        if not run.incremental:
+            return end[run.row[of]][:, plane]
+        steps = np.stack([run.number("XYZ"[axis])[of] for axis in plane], axis=1)
+        steps *= self._state.frames[frame_index].unit_mm
+        before = self._along(np.array(self._state.position))[plane]
+        return np.cumsum(np.vstack((before, np.nan_to_num(steps))), axis=0)[1:]
+
+    def _initials(self, run: CycleRun, drilling: Drilling, start: Array) -> Array:
+        """(k,) the number of the tool axis before each series, of positions `start` (k, 3) before them."""
+        numbers = (start[:, PLANES[run.plane][2]] - drilling.ground) / drilling.unit
+        numbers[: None if self._state.profile.return_level else 1] = self._initial
+        return numbers
 
     def _along(self, point: Array) -> Array:
         """A point (3,) of the axes along the words."""
         return point if self._turning is None else self._turning.words(point)
-
-    def _strokes(
-        self, context: Context, run: CycleRun, drilling: Drilling, place: Array, of: Index
-    ) -> Strokes:
-        x, y, z = self._along(np.array(self._state.position)).tolist()
-        initial = self._initial * drilling.unit + drilling.ground
-        to_r = np.asarray(context.retract[run.line[of]] == RETRACT_TO_R)
-        return strokes(drilling, (x, y, z), place, to_r, initial, beside=self._beside())
 
     def _beside(self) -> bool:
         """Whether the tool still is beside the contour that the last move was of: the next one goes to all
@@ -317,57 +333,70 @@ class CycleBlocks:
         except ProgramError as error:
             refused.where(np.arange(refused.row) == of[over], error.message, error.code)
 
-    def _put(
-        self, context: Context, run: CycleRun, frame: int, drilling: Drilling, place: Array, of: Index,
-        times: Index, counter: Index, made: Strokes,
-    ) -> None:  # fmt: skip
-        """Put the moves and the holes into the collector, and take over the position behind them."""
-        collector, line = self._collector, context.chunk.first_line + 1 + run.line
-        moving, point = made.step <= _FEED, made.point
+    def _holes(
+        self, context: Context, run: CycleRun, drilling: Drilling, place: Array, of: Index, times: Index,
+        counter: Index, levels: Array, made: Strokes,
+    ) -> Holes:  # fmt: skip
+        """The holes (h,) of blocks `of`; `levels` (k,) are those of the tool axis before the series."""
+        chunk, base, line = context.chunk, context.base, run.line[of]
         if self._turning is not None:
-            point = self._turning.axes(point)
             there = np.zeros((len(place), 3))
             there[:, list(PLANES[run.plane][:2])] = place
             place = self._turning.axes(there)[:, list(PLANES[run.plane][:2])]
-        hole = made.hole[moving]
-        flag = np.full(len(line), np.uint8(Flag.CYCLE))
-        flag[context.chunk.deleted[run.line]] |= np.uint8(Flag.DELETED)
-        flag[self._switches.off(line)] |= np.uint8(Flag.PASS)
-        moves = np.bincount(hole, minlength=len(of))
-        last = collector.moves + np.cumsum(moves)
+        moving = made.step <= _FEED
+        moves = np.bincount(made.hole[moving], minlength=len(of))
+        before = np.cumsum(moves) - moves
+        first = self._collector.moves + before + run.straight.searchsorted(run.row[of])
         rest = np.flatnonzero(~moving)
-        word = np.stack([run.slot[letter][of] for letter in CHANGED], axis=1)
-        counter = counter[of]
-        ones = np.ones(len(of), np.int32)
+        word, counter = np.stack([run.slot[letter][of] for letter in CHANGED], axis=1), counter[of]
         begin = np.cumsum(times) - times
-        collector.holes.append(
-            Holes(
-                line=line[of].astype(np.int32),
-                first=last - moves,
-                last=last,
-                word=np.where(word >= 0, word + context.base, -1).astype(np.int32),
-                counter=np.where(counter >= 0, counter + context.base, -1).astype(np.int32),
-                last_word=(context.chunk.first_word[run.line[of] + 1] - 1 + context.base).astype(np.int32),
-                plane=np.full(len(of), run.plane, np.int8),
-                place_mm=place,
-                r_mm=drilling.level(drilling.r),
-                z_mm=drilling.level(drilling.z),
-                initial_mm=np.full(len(of), self._initial * drilling.unit + drilling.ground),
-                incremental=np.full(len(of), run.incremental),
-                repeat=(np.arange(len(of)) - begin[of]).astype(np.int32),
-                repeats=times[of].astype(np.int32),
-                series=ones * self._state.series.count,
-                code=ones * run.code,
-                rest_hole=made.hole[rest],
-                rest_after=(np.cumsum(moving) - (np.cumsum(moves) - moves)[made.hole])[rest],
-                rest_s=made.seconds[rest],
-            )
+        return Holes(
+            line=(chunk.first_line + 1 + line).astype(np.int32),
+            first=first,
+            last=first + moves,
+            word=np.where(word >= 0, word + base, -1).astype(np.int32),
+            counter=np.where(counter >= 0, counter + base, -1).astype(np.int32),
+            last_word=(chunk.first_word[line + 1] - 1 + base).astype(np.int32),
+            plane=np.full(len(of), run.plane, np.int8),
+            place_mm=place,
+            r_mm=drilling.level(drilling.r),
+            z_mm=drilling.level(drilling.z),
+            initial_mm=levels[run.series[of]],
+            incremental=np.full(len(of), run.incremental),
+            repeat=(np.arange(len(of)) - begin[of]).astype(np.int32),
+            repeats=times[of].astype(np.int32),
+            series=(self._state.series.count + run.series[of]).astype(np.int32),
+            code=run.code[of].astype(np.int32),
+            rest_hole=made.hole[rest],
+            rest_after=(np.cumsum(moving) - before[made.hole])[rest],
+            rest_s=made.seconds[rest],
         )
-        count = len(hole)
-        collector.put_moves(
-            np.where(made.step[moving] == _FEED, _LINE, _RAPID),
-            flag[of][hole], line[of][hole], np.full(count, frame), point[moving],
-            np.full((count, 3), -1),
+
+    def _put(
+        self, context: Context, run: CycleRun, rows: Rows, some: slice, end: Array, of: Index, made: Strokes
+    ) -> None:
+        """Put the moves of holes into the collector, with the straight moves between, of the `end` (m, 3) of
+        all rows, and take over the position behind them."""
+        moving, deleted = made.step <= _FEED, context.chunk.deleted[run.line]
+        point = made.point[moving]
+        if self._turning is not None:
+            point = self._turning.axes(point)
+        line = context.chunk.first_line + 1 + run.line
+        flag = np.where(deleted, np.uint8(Flag.CYCLE | Flag.DELETED), np.uint8(Flag.CYCLE))
+        flag[self._switches.off(line)] |= np.uint8(Flag.PASS)
+        block = of[made.hole[moving]]
+        order = np.concatenate((run.straight, run.row[block])).argsort(kind="stable")
+
+        def ordered(straight: npt.NDArray[Any], hole: npt.NDArray[Any]) -> npt.NDArray[Any]:
+            return np.concatenate((straight[run.straight], hole))[order]
+
+        end = ordered(end, point)
+        self._collector.put_moves(
+            ordered(rows.kind[some], np.where(made.step[moving] == _FEED, _LINE, _RAPID)),
+            ordered(rows.flag[some], flag[block]), ordered(rows.number[some], line[block]),
+            ordered(rows.frame[some], np.full(len(block), rows.frame[some.start])), end,
+            ordered(rows.word[some], np.full((len(block), 3), -1)),
         )  # fmt: skip
-        self._moves = collector.moves
-        self._state.position[:] = point[-1].tolist()
+        self._moves = self._collector.moves
+        if len(end):
+            self._state.position[:] = end[-1].tolist()

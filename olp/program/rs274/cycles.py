@@ -116,13 +116,25 @@ def cycle_moves(
         raise ProgramError(f"G{code / 10:g} in plane G{plane}; expected G17, G18 or G19", code="OLP531")
     numbers = [np.full(repeats, np.nan if word is None else word) for word in (r, z, q, p)]
     drilling = Drilling(
-        code, plane - 17, numbers[0], numbers[1], numbers[2], numbers[3], clearance, 1.0, 0.0, rules
+        np.full(repeats, code),
+        plane - 17,
+        numbers[0],
+        numbers[1],
+        numbers[2],
+        numbers[3],
+        clearance,
+        1.0,
+        0.0,
+        rules,
     )
     for bad, why in drilling.faults():
         if bad.any():
             raise why(0)
     places = np.cumsum(np.vstack((xy, np.tile(step, (repeats - 1, 1)))), axis=0)
-    made = strokes(drilling, start, places, np.full(repeats, retract_to_r), initial_z)
+    made = strokes(
+        drilling, np.array([start]), np.zeros(repeats, np.int64), places, np.full(repeats, retract_to_r),
+        np.array([initial_z]),
+    )  # fmt: skip
     rows = zip(made.step.tolist(), made.point.tolist(), made.seconds.tolist(), strict=True)
     return tuple(Stroke(_KINDS[what][0], x, y, z, s, _KINDS[what][1]) for what, (x, y, z), s in rows)
 

@@ -8,8 +8,6 @@ change frames (`axis_state`) or need the present position (`special_blocks`) are
 
 from __future__ import annotations
 
-from dataclasses import field
-
 import numpy as np
 import numpy.typing as npt
 
@@ -19,7 +17,6 @@ from olp.core.machine import UNKNOWN, Setup
 from olp.core.spool import Text, whole
 from olp.core.toolpath import Flag, Kind
 from olp.core.turns import Turn
-from olp.core.values import dataclass
 from olp.program.dialect import Options
 from olp.program.directives import Directives, with_payloads
 from olp.program.program import Program
@@ -38,7 +35,7 @@ from olp.program.rs274.codes import (
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.commands import own_words
 from olp.program.rs274.cycle_blocks import CycleBlocks
-from olp.program.rs274.cycle_runs import CycleWords, runs
+from olp.program.rs274.cycle_runs import CycleWords, Ends, runs
 from olp.program.rs274.cycles import stroke_budget
 from olp.program.rs274.extrusion import Extrusion
 from olp.program.rs274.lexer import WordChunk, chunks
@@ -46,9 +43,9 @@ from olp.program.rs274.modes import Context, Modes, Odd, check_odd, scaled
 from olp.program.rs274.motion import OTHER, Blocks, arc_geometry, fill, gather
 from olp.program.rs274.offset_state import APART, STORES_POSITION, EventBlock
 from olp.program.rs274.profiles.base import Act, Profile
+from olp.program.rs274.rows import Rows
 from olp.program.rs274.special_blocks import (
     KnownBlocks,
-    OwnMove,
     SpecialBlocks,
     check_codes,
     event_block,
@@ -76,36 +73,6 @@ def read(
     are comments in the text of the result (`directives`).
     """
     return _Reader(data, setup, profile, options or Options(), words).run()
-
-
-@dataclass(slots=True, eq=False)
-class _Rows:
-    """The motion lines of a chunk (n,) while they are read: how many have a frame, how many a position.
-    `present` is the index of the frame in force, None after what may have changed it. `runs` leads from the
-    first row of each run of canned cycles to the row behind it, and `cycles` are the words of all. `own` are
-    the moves that the control makes by itself among the rows that have no position yet.
-
-    What holds for the rows wherever they start is there at once: line `number`, `plane`, `kind` and `flag` of
-    the moves, the `word` (n, 3) of each coordinate, and whether these are `incremental`."""
-
-    blocks: Blocks
-    frame: npt.NDArray[np.int32]
-    runs: dict[int, int]
-    cycles: CycleWords
-    number: Index
-    plane: npt.NDArray[np.int16]
-    kind: npt.NDArray[np.uint8]
-    flag: npt.NDArray[np.uint8]
-    word: Index
-    incremental: Mask
-    assigned: int = 0
-    resolved: int = 0
-    present: int | None = None
-    own: list[OwnMove] = field(default_factory=list)
-
-    def waiting(self, upto: int) -> int:
-        """How many moves there are up to a row that are not collected yet."""
-        return max(upto - self.resolved, 0) + len(self.own)
 
 
 class _Reader:
@@ -220,7 +187,9 @@ class _Reader:
 
     # -- stretches between events ------------------------------------------------------------------
 
-    def _rows(self, context: Context, blocks: Blocks, calls: Mask) -> _Rows:
+    def _rows(
+        self, context: Context, blocks: Blocks, calls: Mask, cycles: tuple[dict[int, Ends], CycleWords]
+    ) -> Rows:
         """The rows of a chunk. No block may be put behind lines (of the chunk,) whose motion `calls` a
         cycle."""
         line, deleted = blocks.line, context.chunk.deleted
@@ -249,15 +218,15 @@ class _Reader:
         if self.collector.keep_words:
             word = np.where(word >= 0, word + context.base, -1)
         frame, plane = np.zeros(len(blocks), np.int32), context.plane[line]
-        return _Rows(blocks, frame, *runs(context, line), number, plane, kind, flag, word, incremental)
+        return Rows(blocks, frame, *cycles, number, plane, kind, flag, word, incremental)
 
     def _stretches(self, context: Context, blocks: Blocks, beside: Beside) -> None:
         chunk, state, event = context.chunk, self.state, context.event
-        rows = self._rows(context, blocks, beside.calls)
+        special = event | beside.lines
+        rows = self._rows(context, blocks, beside.calls, runs(context, blocks, special))
         motion = context.motion[blocks.line]
         alone, first = _ALONE[motion], _PROBES[motion]
         first[list(rows.runs)] = True
-        special = event | beside.lines
         special[blocks.line[first]] = True
         lines = np.flatnonzero(special)
         stated = event_words(context, lines[(event | beside.lines)[lines]])
@@ -272,7 +241,9 @@ class _Reader:
             if upto > rows.assigned:
                 self._assign(context, rows, upto)
             if not changes:
-                self._alone(context, rows, upto, Effect())
+                # a run of cycles may have been carried out together with one before
+                if upto >= rows.resolved:
+                    self._alone(context, rows, upto, Effect())
                 continue
             number = chunk.first_line + line + 1
             block = event_block(next(stated), number, state.profile, self.known, deleted=deleted)
@@ -347,7 +318,7 @@ class _Reader:
             return stores and self.state.profile.g10_stores
         return PRESET in block.events
 
-    def _stands(self, context: Context, rows: _Rows, upto: int) -> list[float] | None:
+    def _stands(self, context: Context, rows: Rows, upto: int) -> list[float] | None:
         """Where the axes stand before row `upto`, which the state says where it is None. Where the row before
         it says that alone, its moves need not be there."""
         last, state = upto - 1, self.state
@@ -364,19 +335,22 @@ class _Reader:
             float(value[k]) * frame.unit_mm + shift for k, shift in zip(slot, frame.offset_mm, strict=True)
         ]
 
-    def _alone(self, context: Context, rows: _Rows, row: int, effect: Effect) -> None:
+    def _alone(self, context: Context, rows: Rows, row: int, effect: Effect) -> None:
         """Carry out one row singly, or a run of canned cycles, after the rows before it."""
         self._resolve(context, rows, row)
-        stop = rows.runs.get(row, row + 1)
+        stop, joined = rows.runs.get(row, (row + 1, row + 1))
+        self._assign(context, rows, row + 1)
+        if self.turn is None and self.state.offsets.plane is None and joined > stop:
+            stop, self.state.last_frame = joined, int(rows.frame[row])
         self._assign(context, rows, stop)
         rows.resolved = stop
-        line, frame = rows.blocks.line[row:stop], int(rows.frame[row])
         if row in rows.runs and effect.home is None and not effect.machine:
-            self.cycle_blocks.run(context, rows.cycles, line, frame)
+            self.cycle_blocks.run(context, rows, slice(row, stop))
         else:
-            self.special_blocks.run(context, int(line[0]), rows.blocks.slot[row : row + 1], frame, effect)
+            line, frame = int(rows.blocks.line[row]), int(rows.frame[row])
+            self.special_blocks.run(context, line, rows.blocks.slot[row : row + 1], frame, effect)
 
-    def _call(self, context: Context, rows: _Rows, upto: int, beside: Beside, line: int) -> None:
+    def _call(self, context: Context, rows: Rows, upto: int, beside: Beside, line: int) -> None:
         """Make the hole of a cycle that is called behind the motion of its block."""
         drilling = beside.drilling(line, moves=upto > rows.resolved)
         if drilling is None:
@@ -385,7 +359,7 @@ class _Reader:
         self._resolve(context, rows, upto)
         self.special_blocks.drill(context.number(line), drilling, deleted=bool(context.chunk.deleted[line]))
 
-    def _assign(self, context: Context, rows: _Rows, upto: int) -> None:
+    def _assign(self, context: Context, rows: Rows, upto: int) -> None:
         """Give the present frame to the rows since the last event."""
         if upto > rows.assigned:
             first = int(rows.blocks.line[rows.assigned])
@@ -400,7 +374,7 @@ class _Reader:
                 self.collector.remarks.setdefault("unit", (context.number(first), "mm"))
             rows.assigned = upto
 
-    def _resolve(self, context: Context, rows: _Rows, upto: int) -> None:
+    def _resolve(self, context: Context, rows: Rows, upto: int) -> None:
         """Positions, kinds and arcs of the plain rows up to `upto`."""
         a, rows.resolved = rows.resolved, max(upto, rows.resolved)
         if upto <= a:
@@ -452,7 +426,7 @@ class _Reader:
     def _arcs(
         self,
         context: Context,
-        rows: _Rows,
+        rows: Rows,
         arcs: slice,
         row: Index,
         kind: npt.NDArray[np.uint8],

@@ -95,6 +95,12 @@ class Series:
         self.held = {}
         self.broken = False
 
+    def go_on(self, further: int, initial: float) -> None:
+        """Count further series, if any, the last of which begins at this number."""
+        if further:
+            self.count += further
+            self.initial, self.broken = initial, False
+
     def hold(self, words: Mapping[str, float | None], depth: str) -> None:
         """Keep the words of a block that later blocks inherit; `depth` is the letter of the tool axis."""
         self.held |= {letter: words[letter] for letter in (depth, "R", "Q", "P") if letter in words}

@@ -6,13 +6,13 @@ Codes are integers, ten times the G number (810 is G81). How controls differ is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from enum import IntEnum
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask, any_in_row
+from olp.core.arrays import Array, Index, Mask, any_in_row, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.values import dataclass
@@ -77,14 +77,14 @@ CODES = frozenset(_RECIPES)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drilling:
-    """What (h,) holes of one cycle have in common, and the numbers of each of them.
+    """What (h,) holes have in common, and the cycle `code` and the numbers of each of them.
 
     `r`, `z`, `q` and `clearance` are in program units, and a level n lies at n * `unit` + `ground` of the
     positions. NaN stands for a `q` (peck) or a `p` (dwell in s) that is not there. `plane` is 0 to 2 as in
     `geometry.PLANES`. `clearance` is kept above the last peck (G83), or drawn back after it (G73).
     """
 
-    code: int
+    code: Index
     plane: int
     r: Array
     z: Array
@@ -98,7 +98,7 @@ class Drilling:
     def pick(self, which: slice | Index) -> Drilling:
         """Some of the holes, or some of them several times."""
         return Drilling(
-            self.code, self.plane, self.r[which], self.z[which], self.q[which], self.p[which],
+            self.code[which], self.plane, self.r[which], self.z[which], self.q[which], self.p[which],
             self.clearance, self.unit, self.ground, self.rules,
         )  # fmt: skip
 
@@ -109,65 +109,77 @@ class Drilling:
     @property
     def pecks(self) -> Array:
         """(h,) about how many pecks each hole has, or a few fewer; 0 where the cycle has none."""
-        if self.code not in _PECKING:
-            return np.zeros(len(self.r))
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.nan_to_num(np.maximum((self.r - self.z) / self.q - 2.0, 0.0))
+            pecks = np.nan_to_num(np.maximum((self.r - self.z) / self.q - 2.0, 0.0))
+        return np.where(self._of(_PECKING), pecks, 0.0)
 
     def faults(self) -> Iterator[tuple[Mask, Callable[[int], ProgramError]]]:
         """(h,) holes that have no known strokes, and why one of them has not, in the order of the checks."""
-        name, r, z, q, p = f"G{self.code / 10:g}", self.r, self.z, self.q, self.p
-        everywhere = np.ones(len(r), bool)
-        if self.code not in CODES:
+        r, z, q, p = self.r, self.z, self.q, self.p
+        yield (
+            ~self._of(CODES),
+            lambda i: _error(
+                f"{self._name(i)} has no geometry that is known offline; expected one of "
+                f"{', '.join(f'G{known / 10:g}' for known in sorted(CODES))}; "
+                "write the hole as plain moves",
+                "OLP544",
+            ),
+        )
+        yield (
+            ~(np.isfinite(r) & np.isfinite(z)),
+            lambda i: _error(
+                f"{self._name(i)} without a finite R and Z; give both on the first block of the cycle"
+            ),
+        )
+        back = self._of(BACK_BORES)
+        yield (
+            (r > z) & back,
+            lambda i: _error(f"{self._name(i)} bores upwards, and its R {r[i]:g} is above its end {z[i]:g}"),
+        )
+        yield (
+            (r < z) & ~back,
+            lambda i: _error(
+                f"{self._name(i)} has R {r[i]:g} below the bottom {z[i]:g}; R must not be below it"
+            ),
+        )
+        pecking = self._of(_PECKING)
+        yield (
+            ~(q > 0) & pecking,
+            lambda i: _error(
+                f"{self._name(i)} needs a peck Q greater than zero, found {None if np.isnan(q[i]) else q[i]}"
+            ),
+        )
+        with np.errstate(divide="ignore", invalid="ignore"):
             yield (
-                everywhere,
-                lambda _: _error(
-                    f"{name} has no geometry that is known offline; expected one of "
-                    f"{', '.join(f'G{known / 10:g}' for known in sorted(CODES))}; "
-                    "write the hole as plain moves",
-                    "OLP544",
+                ((r - z) / q > _MAX_PECKS) & pecking,
+                lambda i: _error(
+                    f"{self._name(i)} with Q {q[i]:g} makes more than {_MAX_PECKS} pecks; give a larger Q",
+                    "OLP543",
                 ),
             )
         yield (
-            ~(np.isfinite(r) & np.isfinite(z)),
-            lambda _: _error(f"{name} without a finite R and Z; give both on the first block of the cycle"),
+            np.isnan(p) & self._of(self.rules.dwells),
+            lambda i: _error(f"{self._name(i)} needs a dwell P; give P0 for none"),
         )
-        if self.code in BACK_BORES:
+        yield (
+            p < 0,
+            lambda i: _error(f"{self._name(i)} has a negative dwell P {p[i]:g}; expected zero or more"),
+        )
+        if not self.rules.taps_in_any_plane and self.plane:
             yield (
-                r > z,
-                lambda i: _error(f"{name} bores upwards, and its R {r[i]:g} is above its end {z[i]:g}"),
-            )
-        else:
-            yield (
-                r < z,
-                lambda i: _error(f"{name} has R {r[i]:g} below the bottom {z[i]:g}; R must not be below it"),
-            )
-        if self.code in _PECKING:
-            yield (
-                ~(q > 0),
+                self._of(_TAPPING),
                 lambda i: _error(
-                    f"{name} needs a peck Q greater than zero, found {None if np.isnan(q[i]) else q[i]}"
+                    f"{self._name(i)} in plane G{17 + self.plane}: LinuxCNC 2.9 taps along the wrong axes "
+                    "outside G17; use G17"
                 ),
             )
-            with np.errstate(divide="ignore", invalid="ignore"):
-                yield (
-                    (r - z) / q > _MAX_PECKS,
-                    lambda i: _error(
-                        f"{name} with Q {q[i]:g} makes more than {_MAX_PECKS} pecks; give a larger Q",
-                        "OLP543",
-                    ),
-                )
-        if self.code in self.rules.dwells:
-            yield np.isnan(p), lambda _: _error(f"{name} needs a dwell P; give P0 for none")
-        yield p < 0, lambda i: _error(f"{name} has a negative dwell P {p[i]:g}; expected zero or more")
-        if not self.rules.taps_in_any_plane and self.code in _TAPPING and self.plane:
-            yield (
-                everywhere,
-                lambda _: _error(
-                    f"{name} in plane G{17 + self.plane}: LinuxCNC 2.9 taps along the wrong axes outside "
-                    "G17; use G17"
-                ),
-            )
+
+    def _of(self, codes: Collection[int]) -> Mask:
+        """(h,) whether the cycle of each hole is one of some."""
+        return is_in(self.code, list(codes))
+
+    def _name(self, hole: int) -> str:
+        return f"G{self.code[hole] / 10:g}"
 
 
 def _error(message: str, code: str = "OLP531") -> ProgramError:
@@ -189,30 +201,34 @@ class Strokes:
 
 
 def strokes(
-    drilling: Drilling, start: tuple[float, float, float], place: Array, to_r: Mask, initial: float,
+    drilling: Drilling, start: Array, series: Index, place: Array, to_r: Mask, initial: Array,
     *, beside: bool = False,
 ) -> Strokes:  # fmt: skip
-    """Strokes of holes one behind the other, which have no `faults`; rapids of zero length are left out, a
-    feed of zero length is not.
+    """Strokes of holes of one or more series one behind the other, which have no `faults`; rapids of zero
+    length are left out, a feed of zero length is not.
 
-    `start` is the position before the first of them, `place` (h, 2) where they are along the first and second
-    axis of the plane. `to_r` (h,) return to R only, and others to `initial`, the position on the tool axis
-    before the series, where that is above R. `beside` a contour the tool is not at the start yet: the move to
-    the first hole is one, however short, where the control does not rise before it. Pecks are counted in
-    numbers of the program, as the control does it: the last one may hang on the last bit.
+    `start` (k, 3) are the positions before the first hole of each series, `series` (h,) is that of each hole,
+    `place` (h, 2) where it is along the first and second axis of the plane. `to_r` (h,) return to R only,
+    and others to `initial` (k,), the positions on the tool axis before the series, where that is above R.
+    `beside` a contour the tool is not at the start yet: the move to the first hole is one, however short,
+    where the control does not rise before it. Pecks are counted in numbers of the program, as the control
+    does it: the last one may hang on the last bit.
     """
-    rules, recipe = drilling.rules, _RECIPES[drilling.code]
+    rules = drilling.rules
     first, second, third = PLANES[drilling.plane]
     r, z = drilling.level(drilling.r), drilling.level(drilling.z)
+    initial, opening = initial[series], np.flatnonzero(np.diff(series, prepend=-1))
     # a bore from below always ends above the part
-    back = drilling.code in BACK_BORES
-    clear = np.where((to_r & (not back)) | (r > initial), r, initial)
-    before = np.concatenate(([start[third]], clear[:-1]))
+    clear = np.where((to_r & ~is_in(drilling.code, BACK_BORES)) | (r > initial), r, initial)
+    came, before = np.roll(place, 1, axis=0), np.roll(clear, 1)
+    came[opening], before[opening] = start[series[opening]][:, [first, second]], start[series[opening], third]
     owner, depth = _depths(drilling)
-    full = _PECKING.get(drilling.code, False)
-    width = 3 if full else 2
+    # full pecks come back to R
+    width = 2 + is_in(drilling.code, [code for code, full in _PECKING.items() if full])
     count = np.bincount(owner, minlength=len(r))
-    size = 3 + width * count + len(recipe)
+    size, codes = 3 + width * count, distinct(drilling.code).tolist()
+    for code in codes:
+        size[drilling.code == code] += len(_RECIPES[code])
     stop = np.cumsum(size)
     begin = stop - size
     hole = np.repeat(np.arange(len(r)), size)
@@ -224,17 +240,20 @@ def strokes(
     level[begin], level[begin + 1], level[begin + 2] = (
         np.where(below, r, before), np.where(rises, clear, before), r,
     )  # fmt: skip
-    peck = begin[owner] + 3 + width * (np.arange(len(owner)) - (np.cumsum(count) - count)[owner])
+    peck = begin[owner] + 3 + width[owner] * (np.arange(len(owner)) - (np.cumsum(count) - count)[owner])
     if peck.size:
         step[peck], level[peck] = _FEED, drilling.level(depth)
-        if full:
-            level[peck + 1] = r[owner]
-        level[peck + width - 1] = drilling.level(depth + drilling.clearance)
+        # of two levels for one step the later holds
+        level[peck + 1] = r[owner]
+        level[peck + width[owner] - 1] = drilling.level(depth + drilling.clearance)
     ends = {"z": z, "r": r, "clear": clear, "home": clear if rules.feeds_home else r}
-    for i, (what, where) in enumerate(recipe):
-        step[stop - len(recipe) + i], level[stop - len(recipe) + i] = what, ends[where]
-    came = np.vstack(([start[first], start[second]], place[:-1]))
-    keep = (step != _RAPID) | (level != np.concatenate(([start[third]], level[:-1])))
+    for code in codes:
+        mine = np.flatnonzero(drilling.code == code)
+        for i, (what, where) in enumerate(reversed(_RECIPES[code]), 1):
+            step[stop[mine] - i], level[stop[mine] - i] = what, ends[where][mine]
+    prior = np.roll(level, 1)
+    prior[begin] = before
+    keep = (step != _RAPID) | (level != prior)
     keep[begin + 1] |= any_in_row(place != came)
     keep[begin[:1] + 1] |= beside & ~below[:1]
     point = np.empty((len(hole), 3))
@@ -252,11 +271,9 @@ def _depths(drilling: Drilling) -> tuple[Index, Array]:
 
     Repeated subtraction, as the control does it: a closed form may differ by one peck through rounding.
     """
-    if drilling.code not in _PECKING:
-        return np.zeros(0, np.int64), np.zeros(0)
     holes, depths = [], []
-    hole = np.arange(len(drilling.r))
-    depth = drilling.r - drilling.q
+    hole = np.flatnonzero(is_in(drilling.code, list(_PECKING)))
+    depth = drilling.r[hole] - drilling.q[hole]
     while hole.size:
         more = depth > drilling.z[hole]
         hole, depth = hole[more], depth[more]

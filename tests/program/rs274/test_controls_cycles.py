@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import random
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from cases.acceptance import TRUE_ZERO, machine
@@ -42,6 +45,34 @@ def test_zero_repeats_at_a_place_are_refused(reading) -> None:  # type: ignore[n
     with pytest.raises(ProgramError, match="whether it goes to its place") as caught:
         reading("G99 G81 X1. Z-5. R2. F100. K0\nG80\n")
     assert (caught.value.code, caught.value.line) == ("OLP531", 4)
+
+
+def several(seed: int, dwell: str) -> str:
+    """Series of several cycles that inherit words, repeat, and begin at many levels; `{}` ends each."""
+    draw = random.Random(seed)
+    lines = []
+    for _ in range(9):
+        code = draw.choice(["G81", "G83 Q1.5", "G73 Q2.", "G82 P0.5", "G82" + dwell])
+        r = draw.uniform(-1, 3)
+        lines.append(f"G90 {draw.choice(('G98', 'G99'))} {code} X1. R{r:.2f} Z{r - draw.uniform(0, 4):.2f}")
+        lines += draw.choices(["X5.", "Y3.", "X2. Y4.", "X7. R3.", "Y6. Z-6.", "/X9.", "X8. L2"], k=4)
+        lines += draw.choice([[], ["G91 X1. R-1. Z-3.", "X2.", "G90 R2. Z-1.", "X3."]])
+        ends = ["G0 Z9.", "/G1 Z9.", "G0 X3. Z2.\nY4.", "G1 X4.", "G0 Z1.\nG1 X2. Z5.", "G91 G0 Z1."]
+        lines.append(f"{{}} G80\n{draw.choice(ends)}")
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(("control", "dwell"), [("haas", ""), ("linuxcnc", " P1.")])
+@pytest.mark.parametrize("seed", [3])
+def test_series_made_together_are_those_made_one_by_one(seed: int, control: str, dwell: str, reading) -> None:  # type: ignore[no-untyped-def]
+    """An event, here the offset that is in force already, ends what is carried out together."""
+    start, text = START.replace("O1\n", "F100\n"), several(seed, dwell)
+    together, single = (reading(text.format(*[word] * 9), control, start) for word in ("N54", "G54"))
+    for name in ("end_mm", "kind", "flag", "line"):
+        np.testing.assert_array_equal(getattr(together.toolpath, name), getattr(single.toolpath, name))
+    for field in fields(together.holes):
+        columns = (getattr(program.holes, field.name) for program in (together, single))
+        np.testing.assert_array_equal(*columns, err_msg=field.name)
 
 
 @pytest.mark.parametrize("code", ["G82", "G86", "G89"])

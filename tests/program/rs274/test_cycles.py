@@ -43,8 +43,11 @@ def one_hole(
 ) -> Strokes:  # fmt: skip
     """A hole at 1, 2 from these numbers R, Z and Q, whose levels are scaled and shifted."""
     r, z, q = (np.array([word]) for word in words)
-    drilling = Drilling(code, 0, r, z, q, q, clearance, *scale, NGC_CYCLES)
-    return strokes_of(drilling, start, np.array([[1.0, 2.0]]), np.array([True]), start[2])
+    drilling = Drilling(np.array([code]), 0, r, z, q, q, clearance, *scale, NGC_CYCLES)
+    return strokes_of(
+        drilling, np.array([start]), np.zeros(1, np.int64), np.array([[1.0, 2.0]]), np.array([True]),
+        np.array([start[2]]),
+    )  # fmt: skip
 
 
 def test_drill_goes_over_the_hole_down_and_home() -> None:
