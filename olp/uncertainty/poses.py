@@ -36,10 +36,11 @@ class PoseSpread:
         return np.asarray(COVERAGE * np.sqrt(np.maximum(np.linalg.eigvalsh(self.turn)[:, 2], 0.0)))
 
 
-def pose_spread(model: Model, axes: Array, tool_mm: Array, payload: Payload) -> PoseSpread:
+def pose_spread(model: Model, axes: Array, tool_mm: Array, payload: Payload, misfit_mm: float) -> PoseSpread:
     """The spread of poses at axis values (n, axes) with tools (n, 3) mm from the gauge, beside the shift and
-    turn that fit all of them. `known` of the model is the covariance of its unknowns. Raises CannotCompute
-    where a platform does not close."""
+    turn that fit all of them. `known` of the model is the covariance of its unknowns. `misfit_mm` is the
+    standard deviation of each coordinate of tips beyond them. Raises CannotCompute where a platform does not
+    close."""
     none, count = np.zeros(len(model.unknowns)), len(model.unknowns)
     tip, turn = np.zeros((len(axes), 3, count)), np.zeros((len(axes), 3, count))
     place = np.zeros((len(axes), 3))
@@ -53,7 +54,8 @@ def pose_spread(model: Model, axes: Array, tool_mm: Array, payload: Payload) -> 
     if model.structure.symmetric_tool:
         along = model.machine(none, payload).actual(axes).rotation[:, :, 2]
         turn -= along[:, :, None] * np.einsum("ni,nik->nk", along, turn)[:, None, :]
-    shifts = rest @ model.root
+    beyond = np.broadcast_to(misfit_mm * np.eye(3), (len(axes), 3, 3))
+    shifts = np.concatenate((rest @ model.root, beyond), axis=2)
     return PoseSpread(_covariances(shifts), _covariances(turn @ model.root), shifts)
 
 

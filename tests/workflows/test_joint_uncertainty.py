@@ -105,7 +105,7 @@ def _worst(drawn: np.ndarray) -> np.ndarray:
 def test_what_numbers_do_not_explain_is_part_of_every_band(
     known: tuple[Path, np.ndarray, np.ndarray], tmp_path: Path
 ) -> None:
-    """3 um of each coordinate, in quadrature."""
+    """3 um of each coordinate, in quadrature; and of the probability of the whole program as of each end."""
     stated = f'[covariance]\nfile = "{known[0].parent.as_posix()}/c.npz"\nmisfit_um = 3.0\n'
     machine = machine_of(tmp_path, known[1], stated)
     without, more = (
@@ -116,6 +116,12 @@ def test_what_numbers_do_not_explain_is_part_of_every_band(
     assert more["band_um"]["max_um"] == pytest.approx(added, rel=1e-9)
     assert more["band_urad"] == without["band_urad"]
     assert more["expected"]["after_rms_um"] > 3.0 * np.sqrt(3.0)
+    radius = 1.2 * without["band_um"]["max_um"]
+    sure, doubtful = (
+        olp.correct_joints(LIST.encode(), one, part_tolerance_um=radius).report["part"]
+        for one in (known[0], machine_of(tmp_path, known[1], stated.replace("= 3.0", "= 9.0")))
+    )
+    assert doubtful["probability"] < sure["probability"] - 0.2
 
 
 @pytest.mark.slow

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,8 +53,7 @@ class Known:
         from olp.uncertainty.poses import pose_spread
 
         tools = np.array([machine.tool_mm for machine in path.motion.machines])
-        spread = pose_spread(self.model, axes, tools[tool], run.errors.payload)
-        return replace(spread, tip=spread.tip + self.misfit_mm**2 * np.eye(3))
+        return pose_spread(self.model, axes, tools[tool], run.errors.payload, self.misfit_mm)
 
     def bands_um_urad(self, run: JointRun, path: JointPath, moves: Index) -> tuple[Index, Array, Array]:
         """(n,) lines of moves, at most so many as are looked at, and the bands of tip and tool at their
