@@ -257,7 +257,7 @@ def adjusted(model: Model, starts: Sequence[Start], most: int = _STEPS) -> Joint
     return JointFit(
         model,
         theta,
-        covariance * max(1.0, chi_square / freedom),
+        _scattered(covariance, precision, max(1.0, chi_square / freedom)),
         tuple(sources),
         (),
         chi_square,
@@ -286,6 +286,13 @@ def _score(blocks: Sequence[Block], theta: Array, owns: Sequence[Array]) -> floa
         (chunk,) = block.chunks()
         total += float(np.sum(((chunk.y - chunk.rows @ theta - chunk.local @ own) / chunk.sigma) ** 2))
     return total
+
+
+def _scattered(covariance: Array, precision: Array, factor: float) -> Array:
+    """The covariance of unknowns where readings scatter by this factor more than stated, in squares. What
+    holds an unknown in place of readings holds it as well as before."""
+    held = covariance @ precision @ covariance
+    return np.asarray(factor * covariance - (factor - 1.0) * held)
 
 
 def _unsettled(model: Model) -> CannotCompute:

@@ -230,3 +230,16 @@ def test_a_step_to_where_a_platform_does_not_close_is_halved(monkeypatch: pytest
     halved = fit_joints(model, readings)
     assert len(calls) > 3
     assert np.abs(halved.theta - plain.theta).max() < 0.01 * plain.sigma.max()
+
+
+def test_what_readings_do_not_show_is_held_as_well_where_they_scatter() -> None:
+    """Six times the noise that is stated: an unknown that they show is known six times worse; one that they
+    do not show as well as before."""
+    model, theta, values = true_machine("xyzac_trunnion", count=40)
+    pose = model.machine(theta).actual(values)
+    quiet, loud = (fit_joints(model, [read("points", pose, values, names=1, noise=k)]) for k in (1.0, 6.0))
+    assert 5.0 < np.sqrt(loud.chi_square / loud.freedom) < 7.0
+    share = quiet.sigma / model.prior
+    shown, open_ = int(np.argmin(share)), int(np.argmax(share))
+    assert 4.0 < loud.sigma[shown] / quiet.sigma[shown] < 8.0
+    assert loud.sigma[open_] == pytest.approx(quiet.sigma[open_], rel=0.1)
