@@ -21,8 +21,8 @@ from olp.workflows.shown import Shown
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointSimulation(Shown):
-    """(n, 3) positions of the tip in coordinates of the part where its zero was set, mm, (n, 3) turns of the
-    tool against the nominal one, rad, (n, axes) nominal axis values, and the line of each. Lines count
+    """(n, 3) positions of the tip in mm, in coordinates of the part where its zero was set. (n, 3) turns of
+    the tool against the nominal one, rad, (n, axes) nominal axis values, and the line of each. Lines count
     through the files of an unrolled program (`origin`). The report is "olp-simulation-1"."""
 
     points_mm: Array
