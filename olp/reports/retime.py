@@ -38,6 +38,14 @@ def to_text(report: Report) -> str:
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
 
 
+def _in_tubes(found: Report) -> str:
+    """Why searches for a faster motion found none; nothing where all did."""
+    vain = found["not_faster"]
+    causes = ", ".join(f"{cause} ({count})" for cause, count in vain.items())
+    runs = found["faster"] + sum(vain.values())
+    return f"{sum(vain.values())} of {runs} runs are no faster: {causes}" if vain else ""
+
+
 def _head(report: Report) -> Iterator[str]:
     solvers = "; ".join(f"{name} {seconds:.2f} s" for name, seconds in report["solvers_s"].items())
     feed, dwell = report["feed_moves"], float(report["dwell_s"])
@@ -59,6 +67,7 @@ def _head(report: Report) -> Iterator[str]:
             ),
             ("Limits", f"used at most: {kept}"),
             ("Planned by", f"{solvers}; {_percent(report['ruckig_share'], 1)} of the motion by Ruckig"),
+            ("In tubes", _in_tubes(report["in_tubes"])),
             (
                 "Stretches",
                 f"{len(stretches)}, between moves that the control makes by itself"

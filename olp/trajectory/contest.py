@@ -37,19 +37,23 @@ _AGAIN = 5e-3
 _SEARCHES = 3
 #: share of the time that jerk costs in closed form which optimising does not recover
 _JERK_COST = 0.1
+#: why a motion of a tube is not taken that the tube itself finds faster
+_EXCEEDS = "the motion found is not faster once it keeps all limits and the tolerance"
 #: exceptions of a solver that fails
 _FAILURES = (ArithmeticError, ValueError, IndexError, CannotCompute)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """A valid motion, the `factor` by which it is slowed down (1: not), and its ratios to the limits."""
+    """A valid motion, the `factor` by which it is slowed down (1: not), and its ratios to the limits. Where
+    it was searched for a faster one in a tube, and there is none, `not_faster` says why."""
 
     motion: Motion
     solver: str
     factor: float
     ratios: Ratios
     deviation_mm: float
+    not_faster: str = ""
 
     @property
     def duration_s(self) -> float:
@@ -89,19 +93,25 @@ def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Solu
 def improved(run: Run, best: Solution) -> Solution:
     """The motion of a run whose path and speed are planned together from the best one, where it is faster. It
     is planned again from that one, as long as that gains."""
+    causes: list[str] = []
     for _ in range(_SEARCHES):
         motion = best.driven()
-        solver = Solver(TUBE, partial(_from_motion, motion), LAST.least_s, bends=True)
+        solver = Solver(TUBE, partial(_from_motion, motion, causes), LAST.least_s, bends=True)
         found = _better(run, solver, best) or best
         gained = found.duration_s < (1.0 - _AGAIN) * best.duration_s
         best = found
         if not gained:
             break
-    return best
+    return best if best.solver == TUBE else replace(best, not_faster=(*causes, _EXCEEDS)[0])
 
 
-def _from_motion(motion: Motion, run: Run) -> Motion:
-    return in_tube(run.route, run.limits, motion)
+def _from_motion(motion: Motion, causes: list[str], run: Run) -> Motion:
+    """The motion in a tube. Why there is none goes to the `causes`, too."""
+    try:
+        return in_tube(run.route, run.limits, motion)
+    except _FAILURES as error:
+        causes.append(str(error))
+        raise
 
 
 @dataclass(frozen=True, slots=True, eq=False)

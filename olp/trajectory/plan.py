@@ -31,7 +31,8 @@ from olp.trajectory.stretches import Stretch, runs_of, together
 @dataclass(frozen=True, slots=True, eq=False)
 class Leg:
     """A stretch of a route that one solver drove: waypoints `first` to `last`, in `duration_s`, never
-    farther than `deviation_mm` from the polyline; `factor` is by how much the audit slowed it down."""
+    farther than `deviation_mm` from the polyline; `factor` is by how much the audit slowed it down.
+    `not_faster` says why a search in a tube found no faster motion, where one was made in vain."""
 
     first: int
     last: int
@@ -39,6 +40,7 @@ class Leg:
     duration_s: float
     factor: float
     deviation_mm: float
+    not_faster: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,6 +161,7 @@ def _legs(
                 solution.duration_s,
                 solution.factor,
                 solution.deviation_mm,
+                solution.not_faster,
             )
             for a, b, solution in chosen
         ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
-from olp.trajectory.solvers import EXACT_STOP, OVERLAP
+from olp.trajectory.solvers import EXACT_STOP, OVERLAP, TUBE
 from olp.trajectory.usage import LIMITS, LineUse, SlowStretches
 
 #: lines and slow stretches that a report lists
@@ -46,6 +47,7 @@ def summary(
         "dwell_s": float(use.dwell_s.sum()),
         "solvers_s": solvers,
         "ruckig_share": (solvers.get(OVERLAP, 0.0) + solvers.get(EXACT_STOP, 0.0)) / whole,
+        "in_tubes": _in_tubes(trajectories),
         "slowed_by_at_most": max((leg.factor for t in trajectories for leg in t.legs), default=1.0),
         "largest_share_of_limit": most | {"feed": float(use.most[:, -1].max(initial=0.0))},
         "at_limit": dict(zip(LIMITS, at_limit.tolist(), strict=True)),
@@ -58,6 +60,13 @@ def summary(
         "longest_lines": _lines(use, lost, longest),
         "slowest_lines": _lines(use, lost, slowest[use.feed_length_mm[slowest] > 0.0]),
     }
+
+
+def _in_tubes(trajectories: Sequence[Trajectory]) -> dict[str, Any]:
+    """How many runs a search in a tube made faster, and why others not, with their number."""
+    legs = [leg for t in trajectories for leg in t.legs]
+    causes = Counter(leg.not_faster for leg in legs if leg.not_faster)
+    return {"faster": sum(leg.solver == TUBE for leg in legs), "not_faster": dict(causes.most_common())}
 
 
 def _lines(use: LineUse, lost_s: Array, which: Index) -> list[dict[str, Any]]:

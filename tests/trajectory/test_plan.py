@@ -17,6 +17,7 @@ import olp
 from olp.core.errors import CannotCompute
 from olp.files import trajectory as files
 from olp.trajectory import contest, solvers, stretches
+from olp.trajectory.motion import Motion
 from olp.trajectory.plan import Trajectory, plan
 from olp.trajectory.route import AxisLimits, Route
 
@@ -114,6 +115,15 @@ def test_a_solver_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) 
         with monkeypatch.context() as patch:
             patch.setattr(module, name, broken)
             assert {leg.solver for leg in plan(route, LIMITS, tubes=False).legs} <= remaining
+
+
+def test_a_search_in_a_tube_that_finds_nothing_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> Motion:
+        raise CannotCompute("the run is too long")
+
+    monkeypatch.setattr(contest, "in_tube", fails)
+    trajectory = plan(route_of(np.array([[0, 0, 0], [9, 0, 0], [9, 9, 0.0]])), LIMITS)
+    assert [leg.not_faster for leg in trajectory.legs] == ["the run is too long"]
 
 
 def test_a_route_that_no_solver_drives_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
