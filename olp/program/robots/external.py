@@ -33,9 +33,11 @@ class External:
         """Whether an axis moves on the way to a target, or may move, so that no part of that can be stated.
         One that the target does not state stays. Raises ProgramError where one is at a value at which it is
         not stated what it carries."""
+        if not self._arm or min(map(abs, target.outer), default=ABSENT) >= ABSENT:
+            return False
         before = dict(self._at)
         for number, value in enumerate(target.outer, 1):
-            if not self._arm or abs(value) >= ABSENT:
+            if abs(value) >= ABSENT:
                 continue
             stays = self._declared.get(number, 0.0)
             if number == 1 and self._track is not None:

@@ -117,11 +117,13 @@ def _rows(w: Any, x: Any, y: Any, z: Any) -> tuple[_Row, _Row, _Row]:
 
 def of_zyx(angles_deg: Sequence[float]) -> Quaternion:
     """Rz(first) Ry(second) Rx(third), in degrees."""
-    first, second, third = (radians(angle) / 2.0 for angle in angles_deg)
+    if not any(angles_deg):
+        return NO_TURN
+    first, second, third = angles_deg
+    first, second, third = radians(first) / 2.0, radians(second) / 2.0, radians(third) / 2.0
     a, b, c, d = cos(first), sin(first), cos(second), sin(second)
     e, f = cos(third), sin(third)
-    turn = (a * c * e + b * d * f, a * c * f - b * d * e, a * d * e + b * c * f, b * c * e - a * d * f)
-    return turn if any(angles_deg) else NO_TURN
+    return (a * c * e + b * d * f, a * c * f - b * d * e, a * d * e + b * c * f, b * c * e - a * d * f)
 
 
 def of_vector(vector: Sequence[float]) -> Quaternion:

@@ -30,6 +30,8 @@ def stray_cr(data: bytes) -> int:
 
 def split(data: bytes, ending: re.Pattern[bytes] = LINE_END) -> list[bytes]:
     """The lines with their ends; the end of the last line begins no further line."""
+    if ending is LINE_END and b"\r\r\n" not in data:
+        return data.splitlines(keepends=True)
     rows, begin = [], 0
     for match in ending.finditer(data):
         rows.append(data[begin : match.end()])

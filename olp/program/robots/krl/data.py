@@ -27,7 +27,7 @@ _SECTION = pattern(rb"(?i)(?:GLOBAL\s+)?(DEFDAT|ENDDAT)\b")
 _TAUGHT = pattern(rb"(?i)\b(TOOL_NO|BASE_NO)\s+(\d+)")
 _FIXED = pattern(rb"(?i)\bIPO_FRAME\s+#TCP\b")
 #: Components of a pose.
-_POSE = ("X", "Y", "Z", "A", "B", "C")
+_POSE = frozenset("XYZABC")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +61,9 @@ def is_declaration(text: bytes) -> bool:
 
 def key_of(name: bytes, index: bytes | None) -> str:
     """A name with its index, in capitals and without blanks."""
-    text = name if index is None else name + b"[" + b"".join(index.split()) + b"]"
-    return text.decode("latin-1").upper()
+    if index is not None:
+        name = name + b"[" + b"".join(index.split()) + b"]"
+    return name.decode("latin-1").upper()
 
 
 class Declared:
@@ -166,9 +167,10 @@ class Declared:
 
 def pose_of(numbers: Aggregate, line: int, what: str = "the position") -> Pose:
     """The pose of an aggregate. Raises ProgramError where it is none."""
-    if not set(_POSE) <= set(numbers.values):
+    values = numbers.values
+    if not values.keys() >= _POSE:
         raise ProgramError(
             f"{what} lacks one of X, Y, Z, A, B, C; state all of them", line=line, code="OLP533"
         )
-    x, y, z, *angles = (numbers.values[name][1] for name in _POSE)
-    return Pose((x, y, z), of_zyx(angles))
+    place = values["X"][1], values["Y"][1], values["Z"][1]
+    return Pose(place, of_zyx((values["A"][1], values["B"][1], values["C"][1])))

@@ -119,6 +119,8 @@ class Flow:
                 open_.append((line.line, kind == "loop"))
             elif kind == "end" and open_:
                 open_.pop()
-            elif sets_frames(line.text) or any(self.may_set(name) for name in calls_in(line.text)):
+            elif open_ and (
+                sets_frames(line.text) or any(self.may_set(name) for name in calls_in(line.text))
+            ):
                 found.update(begin for begin, loop in open_ if loop)
         return found

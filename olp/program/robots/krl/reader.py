@@ -392,13 +392,13 @@ class _Reader:
         if numbers.span not in self.targets:
             what = "the position" if name is None else f"the position {key_of(name[1], name[2])}"
             pose, values = pose_of(numbers, line.line, what), numbers.values
-            x, y, z, a, b, c = (values[axis][0] for axis in _POSE)
+            x, y, z, a, b, c = [values[axis][0] for axis in _POSE]
             self.targets[numbers.span] = self.moves.target(
                 declaration.line, numbers.span, (x, y, z), pose.origin_mm, pose.turn, _outer(numbers, 0.0),
                 "" if name is None else name[1].decode("latin-1"),
                 NOWHERE if name is None else (declaration.begin, declaration.end), (a, b, c),
                 (values["T"][0],) if "T" in values else (),
-                tuple(values[word][1] if word in values else NAN for word in "ST"),
+                (values["S"][1] if "S" in values else NAN, values["T"][1] if "T" in values else NAN),
                 _outer(numbers, ABSENT), along=values[_OUTER[0]][0] if _OUTER[0] in values else NOWHERE,
             )  # fmt: skip
         return self.targets[numbers.span], NOWHERE if name is None else span
@@ -414,4 +414,7 @@ class _Reader:
 
 def _outer(numbers: Aggregate, absent: float) -> tuple[float, ...]:
     """The values of the external axes; `absent` is that of one which is not stated, and stays."""
-    return tuple(numbers.values[axis][1] if axis in numbers.values else absent for axis in _OUTER)
+    values = numbers.values
+    if values.keys().isdisjoint(_OUTER):
+        return (absent,) * len(_OUTER)
+    return tuple([values[axis][1] if axis in values else absent for axis in _OUTER])

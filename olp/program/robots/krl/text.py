@@ -51,9 +51,9 @@ def lines(data: bytes) -> Iterator[Line]:
             match = _CODE.match(raw)
             assert match is not None
             code = match[0]
-        text = code.strip()
-        if text and text[:1] != b"&":
-            yield Line(number, place + len(code) - len(code.lstrip()), text)
+        rest = code.lstrip()
+        if rest and rest[:1] != b"&":
+            yield Line(number, place + len(code) - len(rest), rest.rstrip())
         place += len(raw)
 
 
@@ -64,10 +64,14 @@ def aggregate(data: Text, span: Span) -> Aggregate | None:
         return None
     match = _USUAL.fullmatch(data, *span)
     if match is not None:
-        numbers = [(k, float(text)) for k, text in enumerate(match.groups(), 1) if text is not None]
-        values = {_ORDER[k - 1]: (match.span(k), value) for k, value in numbers}
-        large = max(abs(value) for _, value in numbers) >= LARGEST
-        return None if large else Aggregate(match.span(), values, joints=False)
+        whole, *spans = match.regs
+        values = {
+            name: (own, float(text))
+            for name, own, text in zip(_ORDER, spans, match.groups(), strict=True)
+            if text is not None
+        }
+        large = any(not -LARGEST < value < LARGEST for _, value in values.values())
+        return None if large else Aggregate(whole, values, joints=False)
     match = _AGGREGATE.fullmatch(data, *span)
     if match is None:
         return None

@@ -91,9 +91,8 @@ class Ls(RobotDialect):
         data = whole(program.data)
         sections = parts(data)
         stated = line_count(data, sections["ATTR"][0]) if "ATTR" in sections else None
-        count = sum(len(lines(data, part)) for part in sections["MN"])
         # one that is wrong says nothing, and stays
-        if stated is None or stated[1] != count:
+        if stated is None or stated[1] != sum(len(lines(data, part)) for part in sections["MN"]):
             return []
         return [(*stated[0], str(stated[1] + blocks).encode())]
 

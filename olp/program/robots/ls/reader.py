@@ -301,7 +301,7 @@ class _Reader:
         known = self.known.get(number)
         if known is None:
             axes = position.axes
-            (x, a), (y, b), (z, c) = (axes[name] for name in "XYZ")
+            (x, a), (y, b), (z, c) = axes["X"], axes["Y"], axes["Z"]
             text = self.data[slice(*position.config)]
             config = float(self.configs.setdefault((text, position.others), len(self.configs)))
             words, own = postures.words_of(text)
@@ -351,5 +351,5 @@ class _Reader:
 
 def _turn(position: Position) -> tuple[float, float, float, float]:
     """The orientation of a position: Rz(R) Ry(P) Rx(W)."""
-    w, p, r = (position.axes[name][1] for name in "WPR")
-    return of_zyx((r, p, w))
+    axes = position.axes
+    return of_zyx((axes["R"][1], axes["P"][1], axes["W"][1]))

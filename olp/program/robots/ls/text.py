@@ -14,22 +14,24 @@ from olp.program.text.numbers import LARGEST
 _LETTERS = (b"X", b"Y", b"Z", b"W", b"P", b"R")
 _USUAL_UNITS = (b"mm", b"mm", b"mm", b"deg", b"deg", b"deg")
 _AXES = tuple(letter.decode() for letter in _LETTERS)
-#: Their numbers in `_USUAL`.
-_NUMBERS = range(5, 11)
+_USUAL_AXES = frozenset(_AXES)
+#: Their numbers in `_POSITION`.
+_NUMBERS = slice(5, 11)
 _PART = pattern(rb"(?im)^[ \t]*/(PROG|ATTR|APPL|MN|POS|END)\b[^\r\n]*")
 #: A line with its number; a statement ends with the semicolon at the end of a line.
 _LINE = pattern(rb"(?m)^[ \t]*(\d*)[ \t]*:([^\r\n]*?)(;?)[ \t]*\r?$")
-_POSITION = pattern(rb"P\[\s*(\d+)\s*(?::[^\]]*)?\]\s*\{([^{}]*)\}\s*;")
-#: A position in the usual form, as controls write it: of one group, without external axes.
+#: A position: in the usual form, as controls write it, of one group and without external axes; or in any.
 _STATED = rb"\s*=\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*"
-_USUAL = pattern(
-    rb"P\[\s*(\d+)\s*(?::[^\]]*)?\]\s*\{\s*GP1\s*:\s*UF\s*:\s*(\d+|F)\s*,\s*UT\s*:\s*(\d+|F)\s*,\s*"
+_POSITION = pattern(
+    rb"P\[\s*(\d+)\s*(?::[^\]]*)?\]\s*\{(?:\s*GP1\s*:\s*UF\s*:\s*(\d+|F)\s*,\s*UT\s*:\s*(\d+|F)\s*,\s*"
     rb"CONFIG\s*:\s*'([^'{}]*)'\s*,\s*"
     + rb",\s*".join(
         name + _STATED + unit + rb"\s*" for name, unit in zip(_LETTERS, _USUAL_UNITS, strict=True)
     )
-    + rb"\}\s*;"
+    + rb"|([^{}]*))\}\s*;"
 )
+#: The number of its text in any form.
+_OTHER = 11
 _GROUP = pattern(rb"GP(\d+)\s*:")
 _COUNT = pattern(rb"(?im)^[ \t]*LINE_COUNT[ \t]*=[ \t]*(\d+)")
 _NUMBER = rb"([-+]?(?:\d+\.?\d*|\.\d+))"
@@ -73,6 +75,8 @@ class Position:
     @property
     def outer(self) -> tuple[float, ...]:
         """The values of the external axes from the first to the last that is stated."""
+        if self.axes.keys() == _USUAL_AXES:
+            return ()
         stated = {int(name[1:]): value for name, (_, value) in self.axes.items() if name[0] == "E"}
         if not stated:
             return ()
@@ -122,30 +126,30 @@ def positions(data: bytes, part: Span, found: dict[int, list[Position]]) -> None
     for match in _POSITION.finditer(data, *part):
         count += data.count(b"\n", place, match.start())
         place = match.start()
-        usual = _USUAL.fullmatch(data, *match.span())
-        found.setdefault(int(match[1]), []).append(
-            (usual and _usual(usual, count)) or _position(data, match, count)
-        )
+        own = _position(data, match, count) if match[2] is None else _usual(match, count)
+        found.setdefault(int(match[1]), []).append(own)
 
 
-def _usual(match: re.Match[bytes], line: int) -> Position | None:
-    """A position in the usual form; None where a number of it is too large to be one."""
-    _, frame, tool, _, *stated = match.groups()
-    values = [float(text) for text in stated]
-    if max(map(abs, values)) >= LARGEST:
-        return None
-    axes = {name: (match.span(k), value) for name, k, value in zip(_AXES, _NUMBERS, values, strict=True)}
+def _usual(match: re.Match[bytes], line: int) -> Position:
+    """A position in the usual form; a number that is too large to be one is left out."""
+    _, frame, tool, _, x, y, z, w, p, r, _ = match.groups()
+    spans = match.regs
+    values = float(x), float(y), float(z), float(w), float(p), float(r)
+    axes = dict(zip(_AXES, zip(spans[_NUMBERS], values, strict=True), strict=True))
+    if max(values) >= LARGEST or min(values) <= -LARGEST:
+        axes = {name: axis for name, axis in axes.items() if abs(axis[1]) < LARGEST}
     return Position(
-        line, match.span(), match.span(1), -1 if frame == b"F" else int(frame),
-        -1 if tool == b"F" else int(tool), axes, match.span(4), b"", "",
+        line, spans[0], spans[1], -1 if frame == b"F" else int(frame), -1 if tool == b"F" else int(tool),
+        axes, spans[4], b"", "",
     )  # fmt: skip
 
 
 def _position(data: bytes, match: re.Match[bytes], line: int) -> Position:
     """A position in any form."""
-    groups = list(_GROUP.finditer(data, *match.span(2)))
-    bounds = [*(group.start() for group in groups[1:]), match.end(2)][: len(groups)]
-    span, others = (match.span(2) if not groups else (0, 0)), b""
+    whole = match.span(_OTHER)
+    groups = list(_GROUP.finditer(data, *whole))
+    bounds = [*(group.start() for group in groups[1:]), whole[1]][: len(groups)]
+    span, others = (whole if not groups else (0, 0)), b""
     for group, end in zip(groups, bounds, strict=True):
         if group[1] == b"1":
             span = group.end(), end

@@ -225,11 +225,10 @@ class Declared:
         """The element `index` of an array, or data that are none where it is 0; None where the text does not
         state it with numbers."""
         assert data.value is not None
+        if not data.array:
+            return form.fullmatch(self.data, *data.value) if index == 0 else None
         matches = list(form.finditer(self.data, *data.value))
-        if data.array:
-            return matches[index - 1] if 0 < index <= len(matches) else None
-        whole = len(matches) == 1 and index == 0 and matches[0].span() == data.value
-        return matches[0] if whole else None
+        return matches[index - 1] if 0 < index <= len(matches) else None
 
     def joints(self, name: str, index: int, routine: Scope, line: int) -> int | None:
         """The place of declared joint values; None where this text does not state them, or they change."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import zip_longest
 
@@ -24,7 +24,6 @@ _PART = pattern(
     rb"(?:[^,()\[\]{}]|\([^()]*(?:\([^()]*\)[^()]*)*\)|\[[^\[\]]*(?:\[[^\[\]]*\][^\[\]]*)*\]|\{[^{}]*\})+"
 )
 _WORD = pattern(rb"\s*(?<!\w)([A-Za-z]\w*)")
-_SHORT_IF = pattern(rb"(?is)\s*IF\b")
 _HARMLESS_TAIL = pattern(
     rb"(?is).*[\s)](?:GOTO\s+\w+|RETURN\b.*|EXIT|EXITCYCLE|STOP|BREAK|(?:Set|Reset|Wait|TPWrite|Incr|Decr|"
     rb"SetDO|SetGO|SetAO|WaitTime)\b.*|[\w.{}]+\s*:=.*)"
@@ -38,6 +37,8 @@ _FOUND = pattern(rb"\A[^,]*(?:,\s*\\[^,]*)*,\s*([A-Za-z]\w*)")
 _WHOLE = pattern(rb"(?s)\s*[A-Za-z]\w*\s*:=\s*(.*?)\s*")
 _AREA = pattern(rb"(?i)\s*SingArea\b[^\\]*\\\s*(Wrist|LockAxis4)")
 _ARC_MODE = pattern(rb"(?i)\s*CirPathMode\b[^\\]*\\\s*(CirPointOri|Wrist\w*)")
+#: The word of a short IF.
+IF = b"IF"
 #: What a short IF must not hold.
 _MOVES = pattern(rb"(?i)(?<!GOTO )\b(?:Move|Trigg|Search|Arc|PDisp|EOffs)\w*\b")
 
@@ -90,10 +91,6 @@ def _arguments(text: bytes, changing: list[bool]) -> list[bytes]:
     return names
 
 
-def is_short_if(statement: Statement) -> bool:
-    return _SHORT_IF.match(statement.text) is not None
-
-
 def area_of(statement: Statement) -> str:
     """By which switch of `SingArea` the tool does not turn evenly on straight moves; empty for others."""
     match = _AREA.match(statement.text)
@@ -105,6 +102,17 @@ def arc_mode_of(statement: Statement) -> str:
     empty for others."""
     match = _ARC_MODE.match(statement.text)
     return "" if match is None else match[1].decode("latin-1")
+
+
+def first_of(
+    say: Callable[[Statement], str], word: bytes, data: bytes, statements: Iterable[Statement]
+) -> tuple[str, int]:
+    """The first thing that statements say, with its line; "" and 0 where none does, as in a text without the
+    `word`, which is in capitals."""
+    if word not in data.upper():
+        return "", 0
+    said = ((say(statement), statement.line) for statement in statements)
+    return next((each for each in said if each[0]), ("", 0))
 
 
 def may_move(text: bytes) -> bool:
@@ -144,7 +152,7 @@ def given_in(statement: Statement, changing: Mapping[bytes, list[bool]]) -> list
     `changing` are routines of the text, as `changing_parameters` has them."""
     text = statement.text
     word = word_of(statement)
-    inner = inner_move(statement) if is_short_if(statement) else None
+    inner = inner_move(statement) if word == IF else None
     if inner is not None:
         return given_in(inner, changing)
     if is_assignment(statement):
@@ -179,7 +187,7 @@ def moving_routines(statements: Sequence[Statement]) -> tuple[set[str], set[str]
         word = word_of(statement)
         row = TABLE.get(word)
         if (
-            (is_short_if(statement) and calls(statement.text))
+            (word == IF and calls(statement.text))
             or (row is not None and row[0] in (Support.CORRECTED, Support.REFUSED))
             or statement.text.lstrip()[:1] == b"%"
         ):

@@ -76,10 +76,8 @@ class _Reader:
         every = list(statements(self.data, Lines(self.data)))
         rest = self._declare(every)
         self.moving, self.routines = flow.moving_routines(rest)
-        areas = ((flow.area_of(statement), statement.line) for statement in rest)
-        self.any_area = next((area for area in areas if area[0]), self.area)
-        modes = ((flow.arc_mode_of(statement), statement.line) for statement in rest)
-        self.arc_mode = next((mode for mode in modes if mode[0]), ("", 0))
+        self.any_area = flow.first_of(flow.area_of, b"SINGAREA", self.data, rest)
+        self.arc_mode = flow.first_of(flow.arc_mode_of, b"CIRPATHMODE", self.data, rest)
         take_all(rest, self._statement, self.moves, self.refusals, options)
         self.moves.hold_mentioned((statement.begin, statement.end) for statement in every)
         return self.moves.program(dialect, words=words)
@@ -103,9 +101,10 @@ class _Reader:
                 routine = routine.of("")
             if not statement.block and self.declared.declare(statement, routine):
                 continue
-            if not statement.block:
+            given = () if statement.block else flow.given_in(statement, changing)
+            if given:
                 value = flow.value_in(statement)
-                for name in flow.given_in(statement, changing):
+                for name in given:
                     self.declared.give(name, Given(statement, routine, value))
             rest.append(statement)
         return rest
@@ -121,7 +120,7 @@ class _Reader:
         word = flow.word_of(statement)
         if word in FORMS or word in JOINT_MOVES:
             self._any_move(statement, word)
-        elif flow.is_short_if(statement):
+        elif word == flow.IF:
             self._short_if(statement)
         elif flow.is_assignment(statement):
             return
