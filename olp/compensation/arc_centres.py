@@ -87,8 +87,9 @@ def solve(writer: Writer, rows: Rows, by_angle: Mask | None = None) -> ArcRows:
         best = fit(bend, plane[part], start[part], end[part], sweep[part], by_angle is not None)
         equal = (np.abs(sweep[part]) <= WIDE) & (np.abs(bend.mismatch) < 1e-6) & ~bend.rigid
         centre[part] = _on_bisector(start[part], end[part], best, plane[part], equal)
-        flat = _flat(bend, start[part], end[part], sweep[part], plane[part]) & ~bend.rigid
-        small = np.flatnonzero(flat & (np.abs(sweep[part]) <= WIDE))
+        flat = _flat(bend, start[part], end[part], sweep[part], plane[part])
+        flat |= _turned(start[part], end[part], centre[part], sweep[part], plane[part])
+        small = np.flatnonzero(flat & ~bend.rigid & (np.abs(sweep[part]) <= WIDE))
         if small.size:
             which = part[small]
             radius = _radius(_picked(bend, small), plane[which], sweep[which], by_angle is not None)
@@ -179,10 +180,9 @@ def _set_radius(
     centre[which] = moved
 
 
-def _check_sweep(arcs: ArcRows) -> None:
-    """Raise ProgramError where rounding makes a tiny arc a whole circle, or a whole circle a tiny arc."""
-    sweep = arcs.sweep
-    (x0, y0), (x1, y1) = (arms(point, arcs.centre, arcs.plane) for point in (arcs.start, arcs.end))
+def _turned(start: Array, end: Array, centre: Array, sweep: Array, plane: npt.NDArray[np.int8]) -> Mask:
+    """(n,) where arcs between rounded ends are tiny, and were whole circles, or the other way round."""
+    (x0, y0), (x1, y1) = (arms(point, centre, plane) for point in (start, end))
     a0, a1 = np.arctan2(y0, x0), np.arctan2(y1, x1)
     turn = np.where(sweep > 0, a1 - a0, a0 - a1) % (2 * np.pi)
     turn[turn < 1e-9] = 2 * np.pi
@@ -190,7 +190,12 @@ def _check_sweep(arcs: ArcRows) -> None:
     off = np.abs(off - 2 * np.pi * np.rint(off / (2 * np.pi)))
     whole = np.abs(sweep) > np.pi
     flipped = (np.abs(sweep) < 2 * np.pi + 1e-9) & (whole != (turn > np.pi)) & (off < 0.5)
-    bad = np.flatnonzero((off > 1.0) | (flipped & (np.minimum(np.abs(sweep), turn) < 0.1)))
+    return np.asarray((off > 1.0) | (flipped & (np.minimum(np.abs(sweep), turn) < 0.1)), bool)
+
+
+def _check_sweep(arcs: ArcRows) -> None:
+    """Raise ProgramError where rounding makes a tiny arc a whole circle, or a whole circle a tiny arc."""
+    bad = np.flatnonzero(_turned(arcs.start, arcs.end, arcs.centre, arcs.sweep, arcs.plane))
     if bad.size:
         raise ProgramError(
             "the last digit decides whether this short arc is a whole circle; state more digits "

@@ -403,6 +403,15 @@ def test_a_short_arc_that_rounding_would_make_a_circle_is_refused(tmp_path: Path
     assert (caught.value.line, caught.value.code) == (4, "OLP561")
 
 
+def test_a_tiny_arc_keeps_its_radius_where_rounding_would_turn_it_further(tmp_path: Path) -> None:
+    """A quarter of a circle with a radius of three digits, as CAM systems write at corners."""
+    text = HEAD + "".join(f"G1 X{x} Y{x} F100\nG3 X{x}.003 Y{x}.003 R0.003\n" for x in (4, 6, 8, 11))
+    result = corrected(tmp_path, "turned", text)
+    arcs = [line.split() for line in result.data.decode().splitlines() if line.startswith("G3 ")]
+    assert [float(words[-1][1:]) for words in arcs] == pytest.approx([0.003] * 4, abs=1e-3)
+    assert result.report["deviation"]["holds"]
+
+
 def test_a_circle_that_rounding_would_make_a_short_arc_is_refused(tmp_path: Path) -> None:
     """It begins at 5.002, and ends at 5.0025: in G3 that is ahead, in G2 behind."""
     text = HEAD + "G1 X5.003 F100\n{} X5.0030 Y0 J10\n"
