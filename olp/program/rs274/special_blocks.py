@@ -161,9 +161,8 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
     for m in [round(word.value * 10) for word in words if word.letter == "M"]:
         if _calls_by_m(m, words, profile):
             raise ProgramError(
-                f"M{m / 10:g} with P may call a macro, whose arguments are the other words of its block; "
-                "write plain blocks in its place, or list it in still_m_codes of the machine file where it "
-                "moves no axis",
+                f"M{m / 10:g} with P may call a macro with the other words as arguments; write plain blocks, "
+                "or list it in still_m_codes of the machine file where it moves no axis",
                 line=line,
                 code="OLP512",
                 word=f"M{m / 10:g}",
