@@ -28,8 +28,13 @@ from olp.errormodel.quality import Fitted
 _LEAST_SHARE = 1e-3
 #: Directions of the unknowns of which a source says less than this, against the best, count for nothing.
 _NOTHING = 1e-13
-#: Nats by which something is named as wrong with a source: a difference of six standard deviations.
-NAMED = 0.5 * 6.0**2
+#: What may be wrong in one fit, at most: ten mistakes of each of twenty sources.
+_TRIED = 200
+#: Share of fits of sound readings in which one of them may be named.
+_BY_CHANCE = 0.01
+#: Nats by which something is named as wrong with a source. Sound readings give such odds for one mistake with
+#: at most the inverse of them as its chance, whatever the mistake.
+NAMED = math.log(_TRIED / _BY_CHANCE)
 #: Nats by which the others have to confirm what is named: 20 to 1.
 _CONFIRMED = math.log(20.0)
 #: Such a cause explains at least this share of what a source contradicts, by the evidence.

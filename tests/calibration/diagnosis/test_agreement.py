@@ -142,12 +142,12 @@ def test_a_cause_that_the_others_do_not_confirm_is_stated_and_not_named() -> Non
 def test_what_explains_a_wrong_source_best_is_named_even_if_it_is_not_sought() -> None:
     """Half of its values explains a line read elsewhere in part; that it was read elsewhere, in full. What is
     less than 100 times as probable as the other is told with it."""
-    place = Tried("place", "it was read at another place", 29.0, 25.0, sought=False)
-    half = Tried("factor 2", "its values are twice what they should be", 21.5, 20.6)
+    place = Tried("place", "it was read at another place", 24.0, 20.0, sought=False)
+    half = Tried("factor 2", "its values are twice what they should be", 16.5, 15.6)
     one = Agreement("exy.csv", "EXY", Fitted("exy.csv", 30.0, 10.0), (place, half), 0.9)
     assert one.named is place
     assert one.causes == place.words
-    near = dataclasses.replace(place, log_odds=18.5)
+    near = dataclasses.replace(place, log_odds=13.0)
     assert dataclasses.replace(one, tried=(half, near)).causes == f"{half.words}, or {place.words}"
     unconfirmed = dataclasses.replace(place, support=0.0)
     assert dataclasses.replace(one, tried=(unconfirmed, half)).named is half
