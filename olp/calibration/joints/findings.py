@@ -155,31 +155,38 @@ def _cause(model: Model, readings: Sequence[Reading], fit: JointFit | None) -> _
     before = np.inf if fit is None else fit.chi_square / fit.freedom
     # with the rows that a fit leaves out put back, as those of a mistake are all used
     stated = np.inf if fit is None else fit.score + sum(out.deviations**2 for out in fit.left_out)
+    usual = (*mistakes(model.structure, readings), *unstated_payloads(model, readings))
+    found = _explaining(model, readings, usual, before, stated)
+    if not any(one.after < AGREES for one in found):
+        # what has figures of its own explains a little better than what is true, too
+        fitted = (*other_tools(model, readings), *(by_way(fit, readings) if fit is not None else ()))
+        found += _explaining(model, readings, fitted, before, stated)
+    if found:
+        return min(found, key=lambda one: one.after)
+    return _worst_rows(model, readings, before, stated) or _other_dimensions(model, readings, before, stated)
+
+
+def _explaining(
+    model: Model, readings: Sequence[Reading], offers: Sequence[Mended], before: float, stated: float
+) -> list[_Cause]:
+    """Those of some mistakes that explain readings, by `_cause`."""
     found = list[_Cause]()
-    for words, mended, share in _offers(model, readings, fit):
+    for words, mended, share in _worth_a_fit(model, readings, offers):
         try:
             other = adjusted(model, starts_of(model, mended), _QUICK)
         except (CannotCompute, ConfigError):
             continue
         then = other.chi_square / other.freedom
         odds = log_odds(stated, other.score, then) + _volume(readings, mended)
-        explains = then < (_PLAUSIBLE if fit is None else max(AGREES, share * before))
+        explains = then < (max(AGREES, share * before) if np.isfinite(before) else _PLAUSIBLE)
         if explains and odds > DECIDED:
             found.append(_Cause(words, before, then, odds))
-    if found:
-        return min(found, key=lambda one: one.after)
-    return _worst_rows(model, readings, before, stated) or _other_dimensions(model, readings, before, stated)
+    return found
 
 
-def _offers(model: Model, readings: Sequence[Reading], fit: JointFit | None) -> Iterator[Mended]:
-    """The mistakes that are worth a fit: what is farther from the nominal machine than readings as they are,
-    and than errors as usual have it, is not the cause."""
-    offers = [
-        *mistakes(model.structure, readings),
-        *unstated_payloads(model, readings),
-        *other_tools(model, readings),
-        *(by_way(fit, readings) if fit is not None else ()),
-    ]
+def _worth_a_fit(model: Model, readings: Sequence[Reading], offers: Sequence[Mended]) -> Iterator[Mended]:
+    """Of some mistakes those that may be the cause: not what is farther from the nominal machine than
+    readings as they are, and than errors as usual have it."""
     far = [_nominal(model, mended) for _, mended, _ in offers]
     now = _nominal(model, readings)
     least = now if np.isfinite(now) else min(far, default=now)
