@@ -8,6 +8,9 @@ change frames (`axis_state`) or need the present position (`special_blocks`) are
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -230,13 +233,8 @@ class _Reader:
         special[blocks.line[first]] = True
         lines = np.flatnonzero(special)
         stated = event_words(context, lines[(event | beside.lines)[lines]])
-        first_row, behind = (blocks.line.searchsorted(lines, side) for side in ("left", "right"))
-        columns = (
-            lines, first_row, behind > first_row, event[lines] | beside.lines[lines], beside.lines[lines],
-            chunk.deleted[lines], context.distance[lines], context.plane[lines], chunk.first_word[lines],
-        )  # fmt: skip
-        for line, upto, here, changes, calls, deleted, distance, plane, word in zip(
-            *(column.tolist() for column in columns), strict=True
+        for line, upto, here, changes, calls, deleted, distance, plane, word in _of_lines(
+            context, blocks, beside, lines
         ):
             if upto > rows.assigned:
                 self._assign(context, rows, upto)
@@ -474,6 +472,18 @@ class _Reader:
         used, which = np.unique(frame, return_inverse=True)
         table = np.array([(*frames[i].offset_mm, frames[i].unit_mm) for i in used.tolist()])[which]
         return table[:, :3], table[:, 3]
+
+
+def _of_lines(context: Context, blocks: Blocks, beside: Beside, line: Index) -> Iterator[tuple[Any, ...]]:
+    """By lines (n,): the first row not before each, and whether that is its own; whether it changes anything,
+    and whether it calls; whether it is deleted; the distance mode, the plane and the first word."""
+    chunk, calls = context.chunk, beside.lines[line]
+    first, behind = (blocks.line.searchsorted(line, side) for side in ("left", "right"))
+    columns = (
+        line, first, behind > first, context.event[line] | calls, calls, chunk.deleted[line],
+        context.distance[line], context.plane[line], chunk.first_word[line],
+    )  # fmt: skip
+    return zip(*(column.tolist() for column in columns), strict=True)
 
 
 def _check_centres(context: Context, line: Index, words: Index) -> None:
