@@ -173,16 +173,16 @@ def _cyclic(calibration: Calibration, machine: Machine) -> Iterator[Finding]:
 def _columns(calibration: Calibration) -> Iterator[Finding]:
     for curve in calibration.curves:
         for name, values in columns(curve):
-            k = _standing_out(values, _NOTICED_MM if name[1] in AXES else _NOTICED_RAD)
+            k = standing_out(values, _NOTICED_MM if name[1] in AXES else _NOTICED_RAD)
             if k is not None:
                 scale = UM_PER_MM if name[1] in AXES else 1.0 / RAD_PER_URAD
                 place = f"{curve.axis} = {curve.position_mm[k]:g} mm"
                 what = f"calibration: {stated(name, values[k])} at {place} stands out"
-                beside = ", ".join(f"{v * scale:.4g}" for v in _neighbours(values, k))
+                beside = ", ".join(f"{v * scale:.4g}" for v in neighbours(values, k))
                 yield finding("OLP449", f"{what}; expected a value like its neighbours, {beside}")
 
 
-def _standing_out(values: Array, noticed: float) -> int | None:
+def standing_out(values: Array, noticed: float) -> int | None:
     """The index of a value that is no continuation of its neighbours, None where there is none."""
     if len(values) < _FEW:
         return None
@@ -202,7 +202,7 @@ def _standing_out(values: Array, noticed: float) -> int | None:
     return None
 
 
-def _neighbours(values: Array, k: int) -> list[float]:
+def neighbours(values: Array, k: int) -> list[float]:
     return [float(values[i]) for i in (k - 1, k + 1) if 0 <= i < len(values)]
 
 

@@ -42,7 +42,8 @@ if TYPE_CHECKING:
 #: Words of a call that every verb takes on such a machine.
 ALWAYS = ("program", "programs", "nominal", "corrected", "machine", "job", "dialect", "flatten",
            "expand_cycles", "peck_clearance_mm", "output", "tolerance_um", "tolerance_urad", "outside_box",
-           "date", "fail_on", "as_json", "quiet", "force", "step_mm", "part_tolerance_um")  # fmt: skip
+           "date", "accept", "fail_on", "as_json", "quiet", "force", "step_mm",
+           "part_tolerance_um")  # fmt: skip
 
 
 #: What `olp correct` takes beside these.
@@ -67,7 +68,6 @@ _LOG = (
 )
 #: Why an option is not for such machines, and how to go on, by its word.
 WHY_NOT = {
-    "accept": "no doubts about the inputs are found there, so none is accepted; leave it out",
     "add_errors": _LOG,
     "at": "their position is more than X, Y and Z; show a place of the machine file with --axes, such as "
           "--axes C=30",
@@ -262,10 +262,9 @@ def simulate(
 
     from olp.files.write import write_bytes
     from olp.reports.report import to_json
-    from olp.workflows.flatten import UnrollOptions
-    from olp.workflows.joints.simulate import simulated
+    from olp.workflows.joints.simulate import JointSimulateOptions, simulated
 
-    result = simulated(run, options_of(UnrollOptions, words), step_mm)
+    result = simulated(run, options_of(JointSimulateOptions, words), step_mm)
     if output not in (None, STREAM):
         write_bytes(output, result.to_csv(), force=words["force"], inputs=run.files)
         if not words["quiet"]:

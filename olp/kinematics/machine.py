@@ -26,6 +26,7 @@ class JointMachine:
     the program does not say it, empty where the control decides. `swivel_axis` is the axis by whose position
     CYCLE800 chooses between two, empty where that is not stated. `real_time` is the beginning of the hash of
     the calibration that the control corrects by in every servo cycle, None where it does not.
+    `largest_correction_mm` is the largest plausible error of the tip, None where it is not stated.
     """
 
     structure: Structure
@@ -40,6 +41,7 @@ class JointMachine:
     leads: Interpolated = ""
     swivel_axis: str = ""
     real_time: str | None = None
+    largest_correction_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 
 from olp.core.errors import ConfigError
 from olp.core.machine import Axis, Machine
-from olp.core.units import AXES
+from olp.core.units import AXES, MM_PER_UM
 from olp.files.config import beside, in_tenths, moved_by_change, tools_of, work_offsets_of
 from olp.files.kinematics.schema import (
     OWN_DIRECTIONS,
@@ -56,7 +56,7 @@ def load_joint_machine(path: PathLike, read: Reader = read_bytes) -> JointMachin
         structure = posed(structure, words.program_words == "pose", words.posture, words.endless)
     except ConfigError as error:
         raise config_error([(None, problem) for problem in error.problems], str(path)) from None
-    default = file.job_defaults.tool
+    default, largest_um = file.job_defaults.tool, file.check.largest_correction_um
     if default is not None and str(default) not in file.tools:
         raise config_error(
             [(None, f"job_defaults.tool = {default} is not defined; expected a table [tools.N]")], str(path)
@@ -74,6 +74,7 @@ def load_joint_machine(path: PathLike, read: Reader = read_bytes) -> JointMachin
         leads=file.kinematics.orientation_interpolation or "",
         swivel_axis=_swivel_axis(file.kinematics.swivel_axis, structure, path),
         real_time=file.real_time,
+        largest_correction_mm=None if largest_um is None else largest_um * MM_PER_UM,
     )
 
 

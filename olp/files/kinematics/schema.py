@@ -206,6 +206,14 @@ def none_named(value: list[str]) -> list[str]:
     return value
 
 
+class JointCheckTable(Table):
+    largest_correction_um: Positive | None = Field(
+        default=None,
+        description="the largest plausible error of the tip, in um; per metre of the diagonal of its space "
+        "1000 with three linear axes in the chain, else 10,000, and at least 500, if left out",
+    )
+
+
 class JointMachineFile(Table):
     """olp-machine-1 of any joints: its chain, its axes, platforms and tools."""
 
@@ -254,6 +262,9 @@ class JointMachineFile(Table):
     )
     work_offsets: WorkOffsets = Field(default={}, description="tables [work_offsets.NAME]")
     tools: Tools = Field(default={}, description="tables [tools.NUMBER]")
+    check: JointCheckTable = Field(
+        default_factory=JointCheckTable, description="the table [check]: what is plausible on this machine"
+    )
     job_defaults: JobDefaultsTable = Field(
         default_factory=JobDefaultsTable, description="the state at the start of a program"
     )

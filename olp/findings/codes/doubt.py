@@ -62,16 +62,16 @@ RULES = (
         Severity.ERROR,
         "The error model gives an error somewhere in the calibrated box that is larger than such a "
         "machine has. A wrong sign, unit, lever arm or decimal point in the calibration does that.",
-        "Look at the error with `olp inspect machine.toml --at` that position. Raise "
-        "largest_correction_um of [check] where the error is real.",
+        "Look at the error with `olp inspect machine.toml --at` that position, or `--axes` those values. "
+        "Raise largest_correction_um of [check] where the error is real.",
         "`C0Y_urad = 20100` where 20.1 was measured.",
     ),
     _rule(
         "OLP446",
         "angle not plausible",
         Severity.ERROR,
-        "A squareness above 10 mrad or an angular error above 5 mrad shows to the naked eye. Angles in "
-        "other units give such numbers.",
+        "A squareness above 10 mrad or an angular error above 5 mrad shows to the naked eye, and so does one "
+        "above 50 mrad on arms and platforms. Angles in other units give such numbers.",
         "Check unit and decimal point of this value. Angles are in urad: 1 arcsec is 4.848 urad.",
         "`C0Y_urad = 20100`.",
     ),

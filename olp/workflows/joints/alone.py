@@ -3,8 +3,6 @@ known."""
 
 from __future__ import annotations
 
-import datetime
-
 import numpy as np
 
 from olp.checks.base import finding
@@ -14,10 +12,10 @@ from olp.findings.catalogue import Finding
 from olp.kinematics.correction import beyond_travel
 from olp.workflows.joints.along import Along
 from olp.workflows.joints.loaded import JointRun
-from olp.workflows.joints.report import calibration_findings, out_of_box
+from olp.workflows.joints.report import out_of_box, payload_findings
 
 
-def alone(run: JointRun, path: JointPath, date: datetime.date | None) -> list[Finding]:
+def alone(run: JointRun, path: JointPath) -> list[Finding]:
     """Findings on what the program commands, at and between its waypoints: travel, calibrated values, and the
     state of the calibration. Raises ProgramError with the line of a move that no axis values lead."""
     along = Along.of(path)
@@ -27,7 +25,7 @@ def alone(run: JointRun, path: JointPath, date: datetime.date | None) -> list[Fi
         found.append(finding("OLP403", out[0][1], [number for number, _ in out]))
     if not path.judged.any():
         found.append(finding("OLP107", "no feed move ends at a known position"))
-    return [*found, *remark_findings(path.program.in_original()), *calibration_findings(run, date)]
+    return [*found, *remark_findings(path.program.in_original()), *payload_findings(run)]
 
 
 def travel_findings(along: Along) -> list[Finding]:

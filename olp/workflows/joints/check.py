@@ -20,9 +20,11 @@ from olp.findings.choice import chosen
 from olp.findings.rule import Severity
 from olp.reports.joints import verdict_of
 from olp.workflows import refusals
+from olp.workflows.doubt import accepted_of
 from olp.workflows.joints.alone import alone, travel_findings
 from olp.workflows.joints.along import Along
 from olp.workflows.joints.correct import JointOptions, ProvedJoints, correction_of
+from olp.workflows.joints.doubt import doubted
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.verify import verification_of
 from olp.workflows.original import placed_findings
@@ -32,7 +34,8 @@ from olp.workflows.shown import Shown
 #: What is looked for on such a machine, in the order of codes.
 CODES = (
     "OLP101", "OLP102", "OLP103", "OLP105", "OLP106", "OLP107", "OLP108", "OLP111", "OLP311", "OLP312",
-    "OLP331", "OLP332", "OLP401", "OLP402", "OLP403", "OLP405", "OLP408", "OLP422", "OLP433",
+    "OLP331", "OLP332", "OLP401", "OLP402", "OLP403", "OLP405", "OLP408", "OLP409", "OLP422", "OLP433",
+    "OLP445", "OLP446", "OLP447", "OLP448", "OLP449", "OLP450", "OLP451", "OLP452", "OLP460",
 )  # fmt: skip
 
 
@@ -74,6 +77,7 @@ def check_joints(
     expand_cycles: bool = False,
     part_tolerance_um: float | None = None,
     date: datetime.date | None = None,
+    accept: Sequence[str] = (),
     select: Sequence[str] = (),
     ignore: Sequence[str] = (),
 ) -> JointCheck:
@@ -84,7 +88,7 @@ def check_joints(
     options = JointCheckOptions(
         tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, outside_box=outside_box, flatten=flatten,
         expand_cycles=expand_cycles, part_tolerance_um=part_tolerance_um, date=date,
-        select=tuple(select), ignore=tuple(ignore),
+        accept=tuple(accept), select=tuple(select), ignore=tuple(ignore),
     )  # fmt: skip
     run = JointRun.of(program if nominal is None else nominal, machine, job)
     result = examined(run, None if nominal is None else run.sources.source(program, nominal), options)
@@ -116,7 +120,7 @@ def examined(run: JointRun, corrected: Source | None, options: JointCheckOptions
     report = {
         **_head(run, program, options),
         "checked": checked.what,
-        "accepted": [],
+        "accepted": accepted_of(findings),
         "rules": codes,
         "verdict": None if checked.done is None else _verdict(checked.done, kept, codes),
         "findings": [f.as_dict() for f in kept],
@@ -141,20 +145,23 @@ def _checked(run: JointRun, corrected: Source | None, options: JointOptions) -> 
     """A corrected program is proved against that of `run`; a program alone with a stamp is checked unchanged,
     others are corrected here. Raises ProgramError."""
     if corrected is not None:
-        done = verification_of(run, corrected, options)
+        done = verification_of(run, corrected, options, refuse_doubts=False)
         what = f"the corrected program against the nominal one ({run.program.short or 'stdin'})"
         found = [_in_corrected(one, done) for one in done.findings]
         found += stamp_findings(corrected.data, run.program.data, run.digest)
         return _Checked(what, [*found, *_travel(done.corrected)], done)
     data = run.program.data
     if find_stamp(data) is None:
-        done = correction_of(run, options)
+        done = correction_of(run, options, refuse_doubts=False)
         what = "the result of olp correct on the program"
         # commands at waypoints are refused beyond the travel; between them nominal ones are as good
         return _Checked(what, [*done.findings, *_travel(done.nominal)], done)
     with run.program.errors():
         path = run.read(run.program, options)[1]
-        found = alone(run, path, options.date)
+        found = [
+            *doubted(run, path, options.accept, options.date, stamped=data, refuse=False),
+            *alone(run, path),
+        ]
     what = "the corrected program; checks that need the nominal one are left out (give --nominal)"
     return _Checked(
         what, [*placed_findings(found, path.program.origin), *stamp_findings(data, None, run.digest)]

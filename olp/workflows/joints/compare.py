@@ -26,6 +26,7 @@ from olp.uncertainty.spread import COVERAGE
 from olp.workflows.compare import CompareOptions, Comparison, Side, compared
 from olp.workflows.compare_runs import Ground
 from olp.workflows.joints.along import Along
+from olp.workflows.joints.doubt import doubted
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.uncertain import NOT_INCLUDED, figures, known_of
 from olp.workflows.session import PathLike
@@ -82,8 +83,10 @@ def compare_with(run: JointRun, measured: Sequence[PathLike], options: CompareOp
     )  # fmt: skip
     done = compared(side, sets, options)
     known = _uncertainty(run, path, done, options.date)
-    report = done.report if known is None else done.report | {"uncertainty": known}
-    return replace(done, report=report, inputs=(*run.files, *run.sources.files))
+    findings = (*done.findings, *doubted(run, path, options.accept, options.date, refuse=False))
+    report = done.report | {"findings": [one.as_dict() for one in findings]}
+    report |= {} if known is None else {"uncertainty": known}
+    return replace(done, report=report, findings=findings, inputs=(*run.files, *run.sources.files))
 
 
 def _uncertainty(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import hashlib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -30,7 +31,9 @@ from olp.program.robots.dialect import RobotDialect
 from olp.program.text.numbers import spliced
 from olp.proof.joints import JointProof, prove_joints
 from olp.workflows import real_time
+from olp.workflows.doubt import accepted_of
 from olp.workflows.flatten import UnrollOptions, above_zero
+from olp.workflows.joints.doubt import doubted
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.part import judge_part
 from olp.workflows.joints.report import findings_of, last_digits, outside_box, report_of
@@ -43,15 +46,16 @@ from olp.workflows.shown import Shown
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointOptions(UnrollOptions):
     """The options of verbs that prove a correction on a machine with rotary joints: the numerical tolerances
-    of position and orientation, the part tolerance (`part_tolerance_um`, default: the job's), and the day of
-    the run. With `times` a correction states how long both
-    programs take."""
+    of position and orientation, the part tolerance (`part_tolerance_um`, default: the job's), the day of
+    the run, and the codes of doubts to accept. With `times` a correction states how long both programs
+    take."""
 
     tolerance_um: float = 1.0
     tolerance_urad: float = 10.0
     outside_box: Outside = "refuse"
     part_tolerance_um: float | None = None
     date: datetime.date | None = None
+    accept: tuple[str, ...] = ()
     times: bool = False
 
     def __post_init__(self) -> None:
@@ -117,6 +121,7 @@ def correct_joints(
     outside_box: Literal["refuse", "hold"] = "refuse",
     part_tolerance_um: float | None = None,
     date: datetime.date | None = None,
+    accept: Sequence[str] = (),
     times: bool = False,
 ) -> JointCorrection:
     """Correct a program for a machine of any joints, and prove it: G-code for X, Y, Z with rotary axes, or a
@@ -126,12 +131,13 @@ def correct_joints(
     rows are inserted. Moves are split where the tip or the tool would leave its tolerance, in um and urad.
     With `part_tolerance_um` (default: the job's) the report says whether the part is good, as far as the
     calibration knows. With `times` it states how long both programs take, as `retime_joints` plans them.
-    Raises InputError (ProgramError with its line, ConfigError) and CannotCompute.
+    Raises InputError (ProgramError with its line, ConfigError), CannotCompute, and Doubtful where the
+    calibration cannot be right, unless `accept` names the code of the doubt.
     """
     options = JointOptions(
         tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, flatten=flatten,
         expand_cycles=expand_cycles, outside_box=outside_box, part_tolerance_um=part_tolerance_um, date=date,
-        times=times,
+        accept=tuple(accept), times=times,
     )  # fmt: skip
     return corrected(JointRun.of(program, machine, job), options)
 
@@ -146,19 +152,21 @@ def corrected(run: JointRun, options: JointOptions) -> JointCorrection:
     return JointCorrection.of(run, done)
 
 
-def correction_of(run: JointRun, options: JointOptions) -> ProvedJoints:
-    """A program corrected and proved. Raises as `correct_joints`."""
+def correction_of(run: JointRun, options: JointOptions, *, refuse_doubts: bool = True) -> ProvedJoints:
+    """A program corrected and proved. Raises as `correct_joints`; without `refuse_doubts` doubts are findings
+    alone."""
     with run.program.errors():
         _refuse_stamped(run)
         source, nominal = run.read(run.program, options)
         dialect = run.dialect(run.program)
+        doubts = doubted(run, nominal, options.accept, options.date, refuse=refuse_doubts)
         with nominal.program.errors():
             plan = planned_words(nominal, options.limits())
             if options.outside_box == "refuse" and run.calibration is not None:
                 _refuse_outside(nominal, plan, run)
             written = _written(nominal, plan, options.limits())
-        text = _stamped(run, dialect, nominal.program, written.text)
-        return proved(run, source, (nominal, plan), run.again(text, dialect), options, written.tally)
+        text = _stamped(run, dialect, nominal.program, written.text, accepted_of(doubts))
+        return proved(run, source, (nominal, plan), run.again(text, dialect), options, doubts, written.tally)
 
 
 def _written(nominal: JointPath, plan: JointPlan, limits: JointLimits) -> WrittenJoints:
@@ -167,14 +175,16 @@ def _written(nominal: JointPath, plan: JointPlan, limits: JointLimits) -> Writte
     return write_joints(nominal, plan) if nominal.listed is None else write_list(nominal, plan)
 
 
-def _stamped(run: JointRun, dialect: Dialect, nominal: Program, written: bytes | None) -> bytes:
+def _stamped(
+    run: JointRun, dialect: Dialect, nominal: Program, written: bytes | None, accepted: Sequence[str]
+) -> bytes:
     """The text with its stamp. One where nothing changed, None, has it only where the control corrects."""
     by_control = run.machine.real_time is not None
     text = bytes(nominal.data) if written is None else written
     told = written is None and (not by_control or find_real_time(text) is not None)
     if told or not dialect.marks:
         return text
-    stamp = stamp_line(run.digest, dialect.comment, real_time=by_control)
+    stamp = stamp_line(run.digest, dialect.comment, accepted, real_time=by_control)
     if isinstance(dialect, RobotDialect):
         program = replace(nominal, data=text)
         return spliced(text, [dialect.stamped(program, stamp), *dialect.counted(program, 1)])
@@ -186,17 +196,18 @@ def _stamped(run: JointRun, dialect: Dialect, nominal: Program, written: bytes |
 
 def proved(
     run: JointRun, source: Source, nominal: tuple[JointPath, JointPlan], corrected: JointPath,
-    options: JointOptions, tally: Tally | None = None,
+    options: JointOptions, doubts: tuple[Finding, ...], tally: Tally | None = None,
 ) -> ProvedJoints:  # fmt: skip
-    """The proof of two programs with its report and findings."""
+    """The proof of two programs with its report and findings, behind the `doubts` about its inputs."""
     path, plan = nominal
     digit_mm, digit_deg = last_digits(path)
     proof = prove_joints(path, corrected, plan, options.limits(), digit_mm=digit_mm, digit_deg=digit_deg)
     tolerance = options.tolerance_um, options.tolerance_urad
     origin = path.program.origin
-    findings = placed_findings(findings_of(path, plan, proof, run, options.date, tolerance), origin)
+    findings = placed_findings((*doubts, *findings_of(path, plan, proof, run, tolerance)), origin)
     text = bytes(corrected.program.data)
     report = report_of(run, path, plan, proof, findings, tolerance)
+    report["accepted"] = accepted_of(findings)
     report["worst"] = [placed(row, origin) for row in report["worst"]]
     part_um = run.part_tolerance_um(options.part_tolerance_um)
     known = uncertainty_of(run, (path, corrected), proof, options.date, part_um)

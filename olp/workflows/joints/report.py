@@ -197,9 +197,8 @@ def _kept(path: JointPath, plan: JointPlan) -> Index:
 
 
 def findings_of(
-    path: JointPath, plan: JointPlan, proof: JointProof, run: JointRun, date: datetime.date | None,
-    tolerance: tuple[float, float],
-) -> tuple[Finding, ...]:  # fmt: skip
+    path: JointPath, plan: JointPlan, proof: JointProof, run: JointRun, tolerance: tuple[float, float]
+) -> tuple[Finding, ...]:
     """What a person should know of a correction with its tolerances in um and urad."""
     found, line = [], path.program.original_lines(path.line)
     if proof.over.any():
@@ -238,19 +237,14 @@ def findings_of(
         found.append(finding("OLP107", "no feed move was corrected at a known position"))
     if run.calibration is not None:
         found += _outside(path, plan, run)
-    return (*found, *calibration_findings(run, date))
+    return (*found, *payload_findings(run))
 
 
-def calibration_findings(run: JointRun, date: datetime.date | None) -> list[Finding]:
-    """What speaks against the calibration of a run: its age, and the payload that it is for."""
-    calibration = run.calibration
-    if calibration is None:
+def payload_findings(run: JointRun) -> list[Finding]:
+    """What speaks against the calibration of a run: the payload that it is for."""
+    if run.calibration is None or run.machine.real_time is not None:
         return []
-    found = [] if run.machine.real_time is not None else _held(calibration)
-    until = calibration.valid_until
-    if until is not None and date is not None and date > until:
-        found.append(finding("OLP401", f"the calibration was valid until {until}"))
-    return found
+    return _held(run.calibration)
 
 
 def _coarse_digits(path: JointPath, plan: JointPlan, proof: JointProof) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import datetime
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +29,9 @@ from olp.trajectory.motion import Motion as PlannedMotion
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.usage import LineUse, SlowStretches
 from olp.trajectory.variants import feeds_report, written_feeds
+from olp.workflows.doubt import accepted_of
 from olp.workflows.flatten import UnrollOptions
+from olp.workflows.joints.doubt import doubted
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.retime_report import LONGEST, blend_row, summary
 from olp.workflows.original import placed
@@ -42,13 +46,15 @@ _STEPS = 9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointRetimeOptions(UnrollOptions):
-    """The options of `retime` on such machines."""
+    """The options of `retime` on such machines, with the day of the run and the codes of doubts to accept."""
 
     blend_mm: float | None = None
     study_blend: bool = False
     feed_override: float = 100.0
     gains: bool = False
     block_delete: bool = False
+    date: datetime.date | None = None
+    accept: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,6 +196,8 @@ def retime_joints(
     block_delete: bool = False,
     flatten: bool = False,
     expand_cycles: bool = False,
+    date: datetime.date | None = None,
+    accept: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> JointRetiming:
     """The fastest motion found along a program that keeps every axis inside its limits of velocity,
@@ -199,12 +207,14 @@ def retime_joints(
     `blend_mm` is the path tolerance where the program names none; it has priority over the machine file.
     `study_blend` adds times and deviations at a quarter to four times the path tolerances in use.
     `feed_override` is the override of feeds in percent; rapids keep their speed. `gains` adds the lines on
-    which more path tolerance or more feed would save most. `block_delete` leaves `/` blocks out.
+    which more path tolerance or more feed would save most. `block_delete` leaves `/` blocks out. `date` and
+    `accept` are those of `correct_joints`.
     Raises as `correct_joints`, and ConfigError where the machine file leaves a limit out.
     """
     options = JointRetimeOptions(
         blend_mm=blend_mm, study_blend=study_blend, feed_override=feed_override, gains=gains,
-        block_delete=block_delete, flatten=flatten, expand_cycles=expand_cycles,
+        block_delete=block_delete, flatten=flatten, expand_cycles=expand_cycles, date=date,
+        accept=tuple(accept),
     )  # fmt: skip
     run = JointRun.of(program, machine, job)
     other = None if nominal is None else run.sources.source(nominal)
@@ -226,7 +236,10 @@ def retimed(
             return run.read(source, options, block_delete=options.block_delete)[1]
 
     path, other = read(run.program), None if nominal is None else read(nominal)
+    with run.program.errors():
+        doubts = doubted(run, path, options.accept, options.date, stamped=run.program.data)
     result = motion_of(run, path, options, progress)
+    result.report["accepted"] = accepted_of(doubts)
     if other is not None and nominal is not None:
         plain = replace(options, gains=False, study_blend=False)
         there = motion_of(run, other, plain, progress)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import datetime
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,8 +14,10 @@ from olp.core.values import dataclass
 from olp.kinematics.pose_axes import led_in_order
 from olp.kinematics.poses import rotation_vector
 from olp.program.origin import Files, Origin
+from olp.workflows.doubt import accepted_of
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.joints.along import Along
+from olp.workflows.joints.doubt import doubted
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.session import PathLike
 from olp.workflows.shown import Shown
@@ -49,23 +53,40 @@ class JointSimulation(Shown):
         return ("\n".join(rows) + "\n").encode()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointSimulateOptions(UnrollOptions):
+    """The options of `simulate` on such machines: the day of the run, and the codes of doubts to accept."""
+
+    date: datetime.date | None = None
+    accept: tuple[str, ...] = ()
+
+
 def simulate_joints(
-    program: PathLike | bytes, machine: PathLike, job: PathLike | None = None, *, step_mm: float = 1.0
+    program: PathLike | bytes,
+    machine: PathLike,
+    job: PathLike | None = None,
+    *,
+    step_mm: float = 1.0,
+    date: datetime.date | None = None,
+    accept: Sequence[str] = (),
 ) -> JointSimulation:
     """The poses that a machine with its errors takes along a program. Raises as `correct_joints`."""
-    return simulated(JointRun.of(program, machine, job), UnrollOptions(), step_mm)
+    options = JointSimulateOptions(date=date, accept=tuple(accept))
+    return simulated(JointRun.of(program, machine, job), options, step_mm)
 
 
-def simulated(run: JointRun, options: UnrollOptions, step_mm: float) -> JointSimulation:
+def simulated(run: JointRun, options: JointSimulateOptions, step_mm: float) -> JointSimulation:
     """As `simulate_joints`, for a run that is loaded."""
     with run.program.errors():
         _, path = run.read(run.program, options)
+        doubts = doubted(run, path, options.accept, options.date, stamped=run.program.data)
     along = Along.of(path, step_mm).begun()
     nominal, actual = along.nominal(), along.actual()
     turns = rotation_vector(actual.rotation @ np.swapaxes(nominal.rotation, -1, -2))
     structure, move = path.motion.structure, along.move
     names = tuple(f"{name}_{unit}" for name, unit in zip(structure.order, structure.units, strict=True))
     report = {"schema": "olp-simulation-1", "frame": "workpiece", "points": len(move), **run.heads()}
+    report |= {"accepted": accepted_of(doubts), "findings": [one.as_dict() for one in doubts]}
     axes = led_in_order(structure, along.axes)
     line = path.program.in_original().toolpath.line[move].astype(np.int64)
     return JointSimulation(actual.position, turns, axes, line, names, report, origin=path.program.origin)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from collections.abc import Sequence
 from typing import Any
 
 from olp.compensation.joints.writing import planned_words
@@ -14,6 +15,7 @@ from olp.findings.catalogue import Finding
 from olp.proof.joints import JointProof
 from olp.workflows.flatten import AS_IT_IS
 from olp.workflows.joints.correct import JointOptions, ProvedJoints, proved
+from olp.workflows.joints.doubt import doubted
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.session import PathLike
 from olp.workflows.shown import Shown
@@ -47,12 +49,14 @@ def verify_joints(
     expand_cycles: bool = False,
     part_tolerance_um: float | None = None,
     date: datetime.date | None = None,
+    accept: Sequence[str] = (),
 ) -> JointVerification:
     """Prove a corrected program from the nominal and the corrected text alone. Raises as `correct_joints`,
     and ProgramError where the second is not a correction of the first."""
     options = JointOptions(
         tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, flatten=flatten,
         expand_cycles=expand_cycles, part_tolerance_um=part_tolerance_um, date=date,
+        accept=tuple(accept),
     )  # fmt: skip
     run = JointRun.of(nominal, machine, job)
     return verified(run, run.sources.source(corrected, nominal), options)
@@ -64,8 +68,11 @@ def verified(run: JointRun, corrected: Source, options: JointOptions) -> JointVe
     return JointVerification(done.proof, done.report, done.findings)
 
 
-def verification_of(run: JointRun, corrected: Source, options: JointOptions) -> ProvedJoints:
-    """Two texts with the proof. Raises as `verify_joints`."""
+def verification_of(
+    run: JointRun, corrected: Source, options: JointOptions, *, refuse_doubts: bool = True
+) -> ProvedJoints:
+    """Two texts with the proof. Raises as `verify_joints`; without `refuse_doubts` doubts are findings
+    alone."""
     with run.program.errors():
         if find_stamp(run.program.data) is not None and find_stamp(corrected.data) is None:
             raise ProgramError(
@@ -74,9 +81,12 @@ def verification_of(run: JointRun, corrected: Source, options: JointOptions) -> 
                 code="OLP562",
             )
         source, nominal = run.read(run.program, options)
+        doubts = doubted(
+            run, nominal, options.accept, options.date, stamped=corrected.data, refuse=refuse_doubts
+        )
         with nominal.program.errors():
             plan = planned_words(nominal, options.limits())
     with corrected.errors():
         _, written = run.read(corrected, AS_IT_IS)
     with run.program.errors():
-        return proved(run, source, (nominal, plan), written, options)
+        return proved(run, source, (nominal, plan), written, options, doubts)
