@@ -23,8 +23,10 @@ from olp.kinematics.structure import Joint, Structure
 _FLOOR_MM = 0.5
 #: Postures all over the calibrated values at which the error is computed.
 _POSTURES = 200
-#: Calibrated values may reach beyond the travel by this share of it, or by so many mm.
-_BEYOND, _BEYOND_MM = 0.05, 10.0
+#: Calibrated values may reach beyond the travel by this share of it ...
+_BEYOND = 0.05
+#: ... or by so many mm, on short axes.
+_BEYOND_MM = 10.0
 #: How much of the travel calibrated values cover: 40 % at least in a wrong unit, so that the factor shows.
 _COVERED = (0.4, 1.02)
 #: Factors between units of axis values.
@@ -33,10 +35,14 @@ _UNITS = {"linear": {"inches": 25.4, "metres": 1000.0}, "rotary": {"radians": fl
 _RADIANS = 16.0
 #: rad; phases are stated within a turn: 90 is one in degrees.
 _PHASE_RAD = 2.0 * np.pi
-#: Numbers of one unit by which it is judged, and how large others have to be beside them.
-_FEW, _OTHERS = 3, 10.0
-#: mm and rad; values of a curve that stand out by less may be noise.
-_NOTICED_MM, _NOTICED_RAD = 2e-3, 10e-6
+#: Numbers of one unit by which it is judged ...
+_FEW = 3
+#: ... and how many times those that are tiny in the other one has to be.
+_OTHERS = 10.0
+#: mm; a length that stands out of a curve by less may be noise.
+_NOTICED_MM = 2e-3
+#: rad; an angle that stands out by less may be noise.
+_NOTICED_RAD = 10e-6
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import shutil
 import tomllib
+from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -337,7 +338,7 @@ def test_a_written_machine_loads_as_it_was(
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "written.toml"
     path.write_bytes(machine_toml(machine, [note]).encode())
-    assert load_machine(path) == machine
+    assert replace(load_machine(path), file=None) == machine
 
 
 @given(text=st.text())

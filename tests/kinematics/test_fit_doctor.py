@@ -74,7 +74,7 @@ def test_the_covariance_reads_back_and_belongs_to_one_calibration(tmp_path: Path
     # the calibration is used as one without the table is
     before = olp.load_kinematics(machine_in(tmp_path, NAME, "cal.toml")).actual(np.zeros((1, 5))).position
     text = target.read_text()
-    target.write_text(re.sub(r"\[covariance\]\nfile = .*\n", "", text))
+    target.write_text(re.sub(r"\[covariance\]\nfile = .*\nmisfit_um = .*\n", "", text))
     assert target.read_text() != text
     assert np.array_equal(olp.load_kinematics(machine).actual(np.zeros((1, 5))).position, before)
 
@@ -171,6 +171,6 @@ def test_a_calibration_is_refined_from_file_to_file(tmp_path: Path) -> None:
         words = ("calibrate", "refine", target, tmp_path / "wrong.toml", "-m", machine, "-o", new, "--force")
         code, said = run(*words)
         assert (code, words_of in " ".join(said.split())) == (3, True), said
-    target.write_text(re.sub(r"\[covariance\]\nfile = .*\n", "", target.read_text()))
+    target.write_text(re.sub(r"\[covariance\]\nfile = .*\nmisfit_um = .*\n", "", target.read_text()))
     code, said = run(*words[:3], tmp_path / "new.toml", *words[4:])
     assert (code, "states no covariance" in " ".join(said.split())) == (3, True)
