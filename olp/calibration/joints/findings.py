@@ -50,6 +50,8 @@ _NAMED = 8
 _QUIET = 0.1
 #: Errors of a machine with other dimensions are so many times as large as usual.
 _WIDE = 30.0
+#: At least one of its numbers is so many times its usual size.
+_FAR = 5.0
 #: So many of its numbers are named.
 _FEW = 3
 #: So many readings are left out in search of wrong ones, or a twentieth where that is more.
@@ -159,7 +161,8 @@ def _cause(model: Model, readings: Sequence[Reading], fit: JointFit | None) -> _
     found = _explaining(model, readings, usual, before, stated)
     if not any(one.after < AGREES for one in found):
         # what has figures of its own explains a little better than what is true, too
-        fitted = (*other_tools(model, readings), *(by_way(fit, readings) if fit is not None else ()))
+        ways = by_way(fit, readings) if fit is not None else ()
+        fitted = (*other_tools(model, readings, settles=fit is not None), *ways)
         found += _explaining(model, readings, fitted, before, stated)
     if found:
         return min(found, key=lambda one: one.after)
@@ -225,6 +228,8 @@ def _other_dimensions(
     if reduced > AGREES or odds < DECIDED:
         return None
     off = sorted(zip(usual, fit.theta.tolist(), strict=True), key=lambda one: -abs(one[1]) / one[0].prior)
+    if not off or abs(off[0][1]) < _FAR * off[0][0].prior:
+        return None
     named = ", ".join(f"{one.name} {value / one.scale:+.0f}" for one, value in off[:_FEW])
     words = (
         f"they are of another machine, or its dimensions are not those of the machine file: most unusual are "

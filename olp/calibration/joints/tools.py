@@ -16,12 +16,15 @@ from olp.core.errors import CannotCompute, ConfigError
 
 #: mm: so far off a tool vector may be.
 _ANY_MM = 100.0
+#: mm: readings settle with a tool vector that is off by less.
+_UNSETTLING_MM = 1.0
 #: Steps within which readings settle.
 _QUICK = 7
 
 
-def other_tools(model: Model, readings: Sequence[Reading]) -> Iterator[Mended]:
-    """By each tool vector that is stated the one that it may have been, in all readings with it."""
+def other_tools(model: Model, readings: Sequence[Reading], *, settles: bool) -> Iterator[Mended]:
+    """By each tool vector that is stated the one that it may have been, in all readings with it. Where these
+    do not settle as they are, one that is off by little is not why."""
     for stated in dict.fromkeys(reading.tool_mm for reading in readings):
         own = [reading.tool_mm == stated for reading in readings]
         opened = [
@@ -33,8 +36,9 @@ def other_tools(model: Model, readings: Sequence[Reading]) -> Iterator[Mended]:
         except (CannotCompute, ConfigError):
             continue
         change = np.mean([one.own[-3:] for one, mine in zip(fit.sources, own, strict=True) if mine], axis=0)
-        if np.linalg.norm(change) > _ANY_MM:
-            # so far off is another machine
+        far = float(np.linalg.norm(change))
+        # farther off is another machine
+        if not (0.0 if settles else _UNSETTLING_MM) <= far <= _ANY_MM:
             continue
         x, y, z = (float(number) for number in np.array(stated) + change)
         mended = [
