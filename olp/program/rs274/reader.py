@@ -475,8 +475,8 @@ class _Reader:
 
 
 def _of_lines(context: Context, blocks: Blocks, beside: Beside, line: Index) -> Iterator[tuple[Any, ...]]:
-    """By lines (n,): the first row not before each, and whether that is its own; whether it changes anything,
-    and whether it calls; whether it is deleted; the distance mode, the plane and the first word."""
+    """By lines (n,) the first row not before each, and whether that is its own. Then whether it changes
+    anything, calls, and is deleted. Last the distance mode, the plane and the first word."""
     chunk, calls = context.chunk, beside.lines[line]
     first, behind = (blocks.line.searchsorted(line, side) for side in ("left", "right"))
     columns = (

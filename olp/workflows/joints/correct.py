@@ -46,8 +46,8 @@ from olp.workflows.shown import Shown
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointOptions(UnrollOptions):
     """The options of verbs that prove a correction on a machine with rotary joints: the numerical tolerances
-    of position and orientation, the part tolerance (`part_tolerance_um`, default: the job's), the day of
-    the run, and the codes of doubts to accept. With `times` a correction states how long both programs
+    of position and orientation, and the part tolerance (`part_tolerance_um`, default: the job's). Then the
+    day of the run, and the codes of doubts to accept. With `times` a correction states how long both programs
     take."""
 
     tolerance_um: float = 1.0
