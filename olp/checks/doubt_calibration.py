@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -33,25 +33,25 @@ _CYCLIC_RAD = 1e-3
 #: Error per way of a cyclic term: interpolation errors of encoders are 3 % of their period, so 0.2.
 _CYCLIC_SLOPE = 0.2
 #: rad; phases are stated within a turn: 90 is one in degrees.
-_PHASE_RAD = 2.0 * np.pi
+PHASE_RAD = 2.0 * np.pi
 #: A value stands out where it is so many times all others of its column ...
 _STANDS_OUT = 8.0
 #: ... or off its neighbours by so many times what any other value is.
 _OFF = 25.0
 #: mm; a length that stands out by less may be noise.
-_NOTICED_MM = 2e-3
+NOTICED_MM = 2e-3
 #: rad; an angle that stands out by less may be noise.
-_NOTICED_RAD = 10e-6
+NOTICED_RAD = 10e-6
 #: Values of a column below which none can stand out: one of five is a sag.
 _FEW = 7
 #: How much of the travel calibrated boxes cover: 40 % at least in a wrong unit, so that the factor shows.
 _COVERED = (0.4, 1.02)
-#: Factors between units of lengths: inches, metres, micrometres.
-_UNITS = {"inches": 25.4, "metres": 1000.0, "micrometres": 1e-3}
+#: Factors between units of lengths.
+LENGTHS = {"inches": 25.4, "metres": 1000.0}
 #: The box may reach beyond the travel by this share of it: rounded limits, overtravel.
-_BOX_BEYOND = 0.05
+BOX_BEYOND = 0.05
 #: mm; and by this much, for short axes.
-_BOX_BEYOND_MM = 10.0
+BOX_BEYOND_MM = 10.0
 #: Positions of a curve may span so many times the larger of box and travel.
 _CURVE_BEYOND = 3.0
 #: A line or datum may lie outside box and travel by so many times the travel: other zeros of the axes.
@@ -161,8 +161,8 @@ def _cyclic(calibration: Calibration, machine: Machine) -> Iterator[Finding]:
             text = f"{what}: amplitude_{unit} = {size * scale:.6g}; expected at most {limit * scale:g}"
         elif term.period_mm > travel:
             text = f"{what}: period_mm = {term.period_mm:g}; expected less than the travel, {travel:g} mm"
-        elif abs(term.phase_rad) > _PHASE_RAD:
-            text = f"{what}: phase_rad = {term.phase_rad:g}; expected at most {_PHASE_RAD:.4g}, a whole turn"
+        elif abs(term.phase_rad) > PHASE_RAD:
+            text = f"{what}: phase_rad = {term.phase_rad:g}; expected at most {PHASE_RAD:.4g}, a whole turn"
         elif linear and size * 2.0 * np.pi > _CYCLIC_SLOPE * term.period_mm:
             text = f"{what}: {size * scale:g} um in a period of {term.period_mm:g} mm; expected a longer one"
         else:
@@ -173,7 +173,7 @@ def _cyclic(calibration: Calibration, machine: Machine) -> Iterator[Finding]:
 def _columns(calibration: Calibration) -> Iterator[Finding]:
     for curve in calibration.curves:
         for name, values in columns(curve):
-            k = standing_out(values, _NOTICED_MM if name[1] in AXES else _NOTICED_RAD)
+            k = standing_out(values, NOTICED_MM if name[1] in AXES else NOTICED_RAD)
             if k is not None:
                 scale = UM_PER_MM if name[1] in AXES else 1.0 / RAD_PER_URAD
                 place = f"{curve.axis} = {curve.position_mm[k]:g} mm"
@@ -203,6 +203,7 @@ def standing_out(values: Array, noticed: float) -> int | None:
 
 
 def neighbours(values: Array, k: int) -> list[float]:
+    """The values on both sides of one, where there are any."""
     return [float(values[i]) for i in (k - 1, k + 1) if 0 <= i < len(values)]
 
 
@@ -210,22 +211,21 @@ def _box(calibration: Calibration, machine: Machine) -> Iterator[Finding]:
     for axis, (low, high) in zip(AXES, calibration.box_mm.tolist(), strict=True):
         least, most = machine.axes[axis].travel_mm
         box, travel = high - low, most - least
-        unit = _unit_between(box, travel)
+        unit = unit_between(box, travel, LENGTHS)
         stated = f"calibration: box_mm of {axis} is {low:g} to {high:g}, the travel {least:g} to {most:g} mm"
-        slack = max(_BOX_BEYOND * travel, _BOX_BEYOND_MM)
+        slack = max(BOX_BEYOND * travel, BOX_BEYOND_MM)
         if unit:
             yield finding("OLP452", f"{stated}: one of them seems to be in {unit}; expected mm")
         elif low < least - slack or high > most + slack:
             yield finding("OLP452", f"{stated}; expected a box within the travel of this machine")
 
 
-def _unit_between(box: float, travel: float) -> str | None:
-    """The unit in which a box would fit a travel better."""
+def unit_between(box: float, travel: float, units: Mapping[str, float]) -> str | None:
+    """The one of the units, by their factors, in which a box would fit a travel better."""
     low, high = _COVERED
-    for unit, factor in _UNITS.items():
-        for ratio in (box / travel * factor, travel / box * factor):
-            if low <= ratio <= high and factor > 1.0:
-                return unit
+    for unit, factor in units.items():
+        if any(low <= ratio * factor <= high for ratio in (box / travel, travel / box)):
+            return unit
     return None
 
 

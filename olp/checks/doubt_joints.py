@@ -8,7 +8,17 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from olp.checks.base import finding
-from olp.checks.doubt_calibration import neighbours, standing_out
+from olp.checks.doubt_calibration import (
+    BOX_BEYOND,
+    BOX_BEYOND_MM,
+    LENGTHS,
+    NOTICED_MM,
+    NOTICED_RAD,
+    PHASE_RAD,
+    neighbours,
+    standing_out,
+    unit_between,
+)
 from olp.checks.doubt_units import UNMEASURABLE
 from olp.core.arrays import Array, Index
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
@@ -23,26 +33,14 @@ from olp.kinematics.structure import Joint, Structure
 _FLOOR_MM = 0.5
 #: Postures all over the calibrated values at which the error is computed.
 _POSTURES = 200
-#: Calibrated values may reach beyond the travel by this share of it ...
-_BEYOND = 0.05
-#: ... or by so many mm, on short axes.
-_BEYOND_MM = 10.0
-#: How much of the travel calibrated values cover: 40 % at least in a wrong unit, so that the factor shows.
-_COVERED = (0.4, 1.02)
-#: Factors between units of axis values.
-_UNITS = {"linear": {"inches": 25.4, "metres": 1000.0}, "rotary": {"radians": float(np.degrees(1.0))}}
+#: Factor between units of angles.
+_ANGLES = {"radians": float(np.degrees(1.0))}
 #: Two turns and a half: values that are radians span less.
 _RADIANS = 16.0
-#: rad; phases are stated within a turn: 90 is one in degrees.
-_PHASE_RAD = 2.0 * np.pi
 #: Numbers of one unit by which it is judged ...
 _FEW = 3
 #: ... and how many times those that are tiny in the other one has to be.
 _OTHERS = 10.0
-#: mm; a length that stands out of a curve by less may be noise.
-_NOTICED_MM = 2e-3
-#: rad; an angle that stands out by less may be noise.
-_NOTICED_RAD = 10e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +99,7 @@ def _angles(name: str, joint: Joint, errors: JointErrors, sane: _Sane) -> Iterat
     if joint.kind == "rotary":
         stated.append(("zero", abs(errors.zero)))
     for curve in errors.curves:
-        angles = curve.values.y[:, 3 : OWN + (joint.kind == "rotary")]
+        angles = curve.values.y[:, len(AXES) : OWN + (joint.kind == "rotary")]
         stated.append(("largest angle of a curve", float(np.abs(angles).max())))
     for what, angle in stated:
         if angle > sane.angle_rad:
@@ -128,16 +126,16 @@ def _cyclic(name: str, joint: Joint, errors: JointErrors, sane: _Sane) -> Iterat
         elif wave.period > travel:
             what += f" has a period of {wave.period:g} {joint.unit}"
             yield finding("OLP448", f"{what}; expected less than the travel, {travel:g} {joint.unit}")
-        elif abs(wave.phase_rad) > _PHASE_RAD:
+        elif abs(wave.phase_rad) > PHASE_RAD:
             what += f" has a phase of {wave.phase_rad:g} rad"
-            yield finding("OLP448", f"{what}; expected at most {_PHASE_RAD:.4g}, a whole turn")
+            yield finding("OLP448", f"{what}; expected at most {PHASE_RAD:.4g}, a whole turn")
 
 
 def _spikes(name: str, joint: Joint, errors: JointErrors) -> Iterator[Finding]:
     for curve in errors.curves:
         for column, component in enumerate(COMPONENTS):
             values = np.asarray(curve.values.y[:, column])
-            noticed, scale, unit = _of_unit(_turns(column, joint), _NOTICED_MM, _NOTICED_RAD)
+            noticed, scale, unit = _of_unit(_turns(column, joint), NOTICED_MM, NOTICED_RAD)
             k = standing_out(values, noticed)
             if k is not None:
                 at = f"{name} = {float(curve.values.x[k]):g} {joint.unit}"
@@ -165,19 +163,14 @@ def _box(calibration: JointCalibration, structure: Structure) -> Iterator[Findin
         what = f"calibration: box of {name} is {low:g} to {high:g}, the travel {least:g} to {most:g}"
         what += f" {joint.unit}"
         box, travel = high - low, most - least
-        for unit, factor in _UNITS["rotary" if joint.kind == "rotary" else "linear"].items():
-            other = any(
-                _COVERED[0] <= ratio * factor <= _COVERED[1] for ratio in (box / travel, travel / box)
-            )
-            # hundreds of turns are many times a turn, too
-            if other and (joint.kind != "rotary" or min(box, travel) < _RADIANS):
-                yield finding("OLP452", f"{what}: one of them seems to be in {unit}; expected {joint.unit}")
-                break
-        else:
-            # a rotary axis may be calibrated over more than it turns
-            slack = max(_BEYOND * travel, _BEYOND_MM)
-            if joint.kind != "rotary" and (low < least - slack or high > most + slack):
-                yield finding("OLP452", f"{what}; expected values within the travel of this machine")
+        rotary, slack = joint.kind == "rotary", max(BOX_BEYOND * travel, BOX_BEYOND_MM)
+        unit = unit_between(box, travel, _ANGLES if rotary else LENGTHS)
+        # hundreds of turns are many times a turn, too
+        if unit and (not rotary or min(box, travel) < _RADIANS):
+            yield finding("OLP452", f"{what}: one of them seems to be in {unit}; expected {joint.unit}")
+        # a rotary axis may be calibrated over more than it turns
+        elif not rotary and (low < least - slack or high > most + slack):
+            yield finding("OLP452", f"{what}; expected values within the travel of this machine")
 
 
 def _units(calibration: JointCalibration, structure: Structure, sane: _Sane) -> Iterator[Finding]:

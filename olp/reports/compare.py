@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from olp.reports import shown
+from olp.reports.joints import band_rows
 from olp.reports.report import (
     MEASURED_BOTH,
     Report,
@@ -127,16 +128,9 @@ def _uncertainty(report: Report) -> Iterator[str]:
 def uncertainty_rows(report: Report) -> list[tuple[str, str]]:
     """How well the calibration knows the poses that are compared, in words."""
     part = report["uncertainty"]
-    tip, turn, share = part["band_um"], part["band_urad"], part.get("measured_within")
-    factor = part["coverage_factor"]
+    share = part.get("measured_within")
     within = "" if share is None else f"{100.0 * share:.0f} % of the measured points that count"
-    return [
-        ("Tip", f"+-{number(tip['median_um'])} um median, {number(tip['max_um'])} um largest "
-         f"(expanded, k = {factor:g}, in the worst direction)"),
-        ("Tool", f"+-{number(turn['median_urad'])} urad median, {number(turn['max_urad'])} urad largest"),
-        ("Within it", within),
-        ("From", part["source"]),
-    ]  # fmt: skip
+    return [*band_rows(part), ("Within it", within), ("From", part["source"])]
 
 
 def _before_after(report: Report) -> Iterator[str]:

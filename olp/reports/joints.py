@@ -129,10 +129,9 @@ def _uncertainty(report: Report) -> Iterator[str]:
         yield from pairs([(f"  {name}", value) for name, value in uncertainty_rows(report)])
 
 
-def uncertainty_rows(report: Report) -> list[tuple[str, str]]:
-    """What is not known of the poses, in words."""
-    part = report["uncertainty"]
-    tip, turn, expected = part["band_um"], part["band_urad"], part["expected"]
+def band_rows(part: Report) -> list[tuple[str, str]]:
+    """The bands of tip and tool, in words."""
+    tip, turn = part["band_um"], part["band_urad"]
     return [
         (
             "Tip",
@@ -140,6 +139,15 @@ def uncertainty_rows(report: Report) -> list[tuple[str, str]]:
             f"k = {part['coverage_factor']:g}, in the worst direction)",
         ),
         ("Tool", f"+-{number(turn['median_urad'])} urad median, {number(turn['max_urad'])} urad largest"),
+    ]
+
+
+def uncertainty_rows(report: Report) -> list[tuple[str, str]]:
+    """What is not known of the poses, in words."""
+    part = report["uncertainty"]
+    expected = part["expected"]
+    return [
+        *band_rows(part),
         (
             "Deviation",
             f"expected {number(expected['before_rms_um'])} um rms uncorrected, "

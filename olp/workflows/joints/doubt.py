@@ -16,7 +16,7 @@ from olp.core.spool import Text
 from olp.findings.catalogue import Finding
 from olp.workflows.doubt import acceptable, with_accepted
 from olp.workflows.joints.loaded import JointRun
-from olp.workflows.joints.uncertain import spread_evenly
+from olp.workflows.joints.uncertain import ends_of
 
 
 def doubted(
@@ -47,13 +47,11 @@ def _at_waypoints(path: JointPath, limit_mm: float) -> list[Finding]:
     rows = np.flatnonzero(path.judged & np.isfinite(path.end).all(axis=1))
     if not len(rows):
         return []
-    looked = spread_evenly(rows)
-    tool = path.tool[looked]
     try:
-        axes = path.motion.axes(path.end[looked], tool, path.tip[looked])
+        looked, tool, axes = ends_of(path, rows)
     except NotInvertible:
         # the plan says which line is out of reach
         return []
     off = path.motion.actual(axes, tool).position - path.motion.nominal(axes, tool).position
-    line = path.program.in_original().toolpath.line[looked].astype(np.int64)
+    line = path.program.original_lines(path.line[looked])
     return waypoint_doubts(np.linalg.norm(off, axis=1), line, limit_mm)

@@ -60,11 +60,9 @@ class Known:
         ends."""
         from olp.uncertainty.spread import bands
 
-        looked = spread_evenly(moves)
-        tool = path.tool[looked]
-        axes = path.motion.axes(path.end[looked], tool, path.tip[looked])
+        looked, tool, axes = ends_of(path, moves)
         spread = self.spread(run, path, axes, tool)
-        line = path.program.in_original().toolpath.line[looked].astype(np.int64)
+        line = path.program.original_lines(path.line[looked])
         return line, bands(spread.tip) * UM_PER_MM, spread.turn_band_rad / RAD_PER_URAD
 
 
@@ -100,9 +98,7 @@ def uncertainty_of(
         return None
     from olp.uncertainty.spread import COVERAGE, bands
 
-    looked = spread_evenly(rows)
-    tool = path.tool[looked]
-    axes = path.motion.axes(path.end[looked], tool, path.tip[looked])
+    looked, tool, axes = ends_of(path, rows)
     spread = known.spread(run, path, axes, tool)
     tip, turn = bands(spread.tip) * UM_PER_MM, spread.turn_band_rad / RAD_PER_URAD
     scatter_um2 = float(np.trace(spread.tip, axis1=1, axis2=2).mean()) * UM_PER_MM**2
@@ -160,9 +156,12 @@ def _off_mm(nominal: JointPath, path: JointPath, move: Index, rows: Index) -> Ar
     return np.asarray(places.poses(path)[1].position - places.targets(nominal).position)
 
 
-def spread_evenly(rows: Index) -> Index:
-    """So many of rows as are looked at, at most."""
-    return rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MOST)).astype(np.int64))]
+def ends_of(path: JointPath, moves: Index) -> tuple[Index, Index, Array]:
+    """Moves at whose ends is looked, evenly spread ones of many, their tools, and the axis values (n, axes)
+    there. Raises NotInvertible."""
+    looked = moves[np.unique(np.linspace(0, len(moves) - 1, min(len(moves), _MOST)).astype(np.int64))]
+    tool = path.tool[looked]
+    return looked, tool, path.motion.axes(path.end[looked], tool, path.tip[looked])
 
 
 def _rms_um(side: Deviation, proof: JointProof) -> float:
