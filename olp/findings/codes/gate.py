@@ -144,8 +144,8 @@ RULES = (
         Severity.ERROR,
         "A waypoint was moved by more than largest_correction_um of [check]. The machine has such large "
         "errors, or an input is wrong: a sign, a unit, an offset, another machine.",
-        "Look at the error with `olp inspect machine.toml --at` that position. Raise the limit where the "
-        "error is real.",
+        "Look at the error with `olp inspect machine.toml --at` that position, or `--axes` those values. "
+        "Raise the limit where the error is real.",
         "EXX in nm, written into the column EXX_um.",
         doubt=True,
     ),
