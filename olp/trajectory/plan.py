@@ -70,13 +70,14 @@ class Trajectory:
 
 def plan(
     route: Route, limits: AxisLimits, tell: Progress | None = None, *, optimise: bool | None = None,
-    tubes: bool = True,
+    tubes: bool = True, share: float = 1.0,
 ) -> Trajectory:  # fmt: skip
     """The motion of a route that begins and ends at rest.
 
     `optimise`: whether speeds along dense curves are optimised; None: where that is worth its work, as
     `olp.trajectory.searches` finds.
     `tubes`: whether path and speed may be planned together where that gains most.
+    `share`: of the work that searches afford, as a program of several routes affords no more than one.
     Raises CannotCompute for a route that is not finite.
     """
     _check(route, limits)
@@ -86,14 +87,14 @@ def plan(
     used = [Ratios(none, none, none, 0.0)]
 
     def parts() -> Iterator[Motion]:
-        runs = runs_of(route, limits, tubes=tubes and optimise is not False)
+        runs = runs_of(route, limits, tubes=share if tubes and optimise is not False else 0.0)
         known: dict[int, Solution] = {}
         if optimise is None:
             # a run is tried with and without a tube, which begins from the motion without
             bare: dict[int, Solution | None] = {}
             runs, known = searched(
                 runs, len(route), lambda run: _solution(route, limits, run, bare),
-                lambda run: _in_group(route, limits, run),
+                lambda run: _in_group(route, limits, run), share,
             )  # fmt: skip
         elif optimise:
             runs = [replace(run, optimise=True) for run in runs]

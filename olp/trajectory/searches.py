@@ -40,20 +40,20 @@ Solve = Callable[[Stretch], Solution | None]
 
 
 def searched(
-    runs: Sequence[Stretch], waypoints: int, solve: Solve, in_group: Solve
+    runs: Sequence[Stretch], waypoints: int, solve: Solve, in_group: Solve, share: float
 ) -> tuple[list[Stretch], dict[int, Solution]]:
     """The runs with those marked that are optimised, and in tubes only those of which that is worth it; and
     the solutions that are known from trials, by the first waypoint of their run. Short runs that are not
-    optimised are planned `in_group`."""
+    optimised are planned `in_group`. `share` of the work that is afforded is theirs."""
     known: dict[int, Solution] = {}
     whole_s = sum(run.least_s for run in runs)
     cost = [run.cost() for run in runs]
     chosen = {k for k, run in enumerate(runs) if run.bends and run.segments > SHORT}
-    if sum(cost[k] for k in chosen) > _AFFORDED:
+    if sum(cost[k] for k in chosen) > share * _AFFORDED:
         chosen = set()
     else:
         short = [k for k, run in enumerate(runs) if run.bends and run.segments <= SHORT]
-        short = _within(short, runs, cost, waypoints)
+        short = _within(short, runs, cost, share * _OF_SHORT + _EACH * min(waypoints, _WAYPOINTS))
         speed = _Search(lambda run: in_group(_bare(run)), lambda run: solve(_optimised(_bare(run))), _TRIAL)
         if speed.worth([runs[k] for k in short], [cost[k] for k in short], whole_s, known):
             chosen.update(short)
@@ -77,9 +77,8 @@ def _bare(run: Stretch) -> Stretch:
     return replace(run, cells=0.0) if run.tube else run
 
 
-def _within(short: list[int], runs: Sequence[Stretch], cost: Sequence[float], waypoints: int) -> list[int]:
-    """Of short runs those that take most time for their cost, as many as are afforded."""
-    most = _OF_SHORT + _EACH * min(waypoints, _WAYPOINTS)
+def _within(short: list[int], runs: Sequence[Stretch], cost: Sequence[float], most: float) -> list[int]:
+    """Of short runs those that take most time for their cost, which is at most `most` in all."""
     own = np.array([cost[k] for k in short])
     each = np.array([runs[k].least_s for k in short])
     order = np.argsort(-each / np.maximum(own, 1.0), kind="stable")

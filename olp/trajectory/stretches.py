@@ -74,9 +74,9 @@ class Stretch:
         return _CALL + _PIECES * self.segments + seconds / CELL_S
 
 
-def runs_of(route: Route, limits: AxisLimits, *, tubes: bool = False) -> list[Stretch]:
+def runs_of(route: Route, limits: AxisLimits, *, tubes: float = 0.0) -> list[Stretch]:
     """The runs from each stop to the next, and the solvers that may win, the most promising first. With
-    `tubes` those that lose most time are planned in them."""
+    `tubes`, a share of the cells that are afforded, those that lose most time are planned in them."""
     stops = stops_of(route)
     if len(stops) < 2:
         return []
@@ -88,7 +88,7 @@ def runs_of(route: Route, limits: AxisLimits, *, tubes: bool = False) -> list[St
     keep = least_s <= np.where(bends, np.inf, first / _CLEAR_WIN)
     # a program of exact stops has as many runs as waypoints
     alone = [(Candidate(solver, 0.0),) for solver in SOLVERS]
-    cells = _tubed(route, limits, stops, first) if tubes else np.zeros(len(first))
+    cells = _tubed(route, limits, stops, first, tubes) if tubes else np.zeros(len(first))
     runs = []
     for begin, end, ranks, fits, some, tube, about_s in zip(
         stops[:-1].tolist(), stops[1:].tolist(), order.T.tolist(), keep.T.tolist(), least_s.T.tolist(),
@@ -141,16 +141,16 @@ def _forecast(route: Route, limits: AxisLimits, stops: Index) -> Array:
     return seconds
 
 
-def _tubed(route: Route, limits: AxisLimits, stops: Index, least_s: Array) -> Array:
+def _tubed(route: Route, limits: AxisLimits, stops: Index, least_s: Array, share: float) -> Array:
     """(r,) cells of the runs that are planned in tubes: those that lose most time beside a straight move for
-    each cell, as many as are affordable; 0 of others. `least_s` (r,) are about the seconds of each run."""
+    each cell, as many as the `share` affords; 0 of others. `least_s` (r,): about the seconds of each run."""
     segment_s, straight_s = straight(route, limits, stops)
     cells = cells_of(segment_s, route.tolerance_mm, limits)
     count = np.maximum(np.add.reduceat(cells, stops[:-1]), 1.0)
     order = np.argsort((straight_s - least_s) / count, kind="stable")
     fits = (np.diff(stops) > 1) & (count <= MOST_CELLS)
     order = order[fits[order]]
-    tubed = order[np.cumsum(_OF_TUBE + count[order]) <= _CELLS]
+    tubed = order[np.cumsum(_OF_TUBE + count[order]) <= share * _CELLS]
     found = np.zeros(len(least_s))
     found[tubed] = count[tubed]
     return found

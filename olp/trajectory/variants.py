@@ -174,7 +174,7 @@ def planned(case: Case, limits: AxisLimits, tell: Progress, what: str = "plan") 
 def _motions(legs: Sequence[Route], limits: AxisLimits, tell: Progress, what: str) -> tuple[Trajectory, ...]:
     edges = np.cumsum([0, *map(len, legs)]) / max(sum(map(len, legs)), 1)
     return tuple(
-        plan(leg, limits, lambda _, share, a=a, b=b: tell(what, a + share * (b - a)))  # type: ignore[misc]
+        plan(leg, limits, lambda _, part, a=a, b=b: tell(what, a + part * (b - a)), share=b - a)  # type: ignore[misc]
         for leg, (a, b) in zip(legs, pairwise(edges.tolist()), strict=True)
     )
 

@@ -387,7 +387,7 @@ def test_an_interrupt_leaves_nothing(
     part = program(tmp_path)
     before = sorted(p.name for p in tmp_path.iterdir())
 
-    def stop(*args: object) -> Iterator[object]:
+    def stop(*args: object, **names: object) -> Iterator[object]:
         raise KeyboardInterrupt
 
     def one_and_stop(trajectory: Any, cycle_s: float) -> Iterator[object]:

@@ -120,14 +120,16 @@ def test_no_more_runs_are_in_tubes_than_are_affordable() -> None:
     corners = np.cumsum(np.tile([[0.5, 0.0], [0.0, 0.5]], (400, 1)), axis=0)
     route = route_of(corners, 0.01)
     route.tolerance_mm[::2] = 0.0
-    runs = runs_of(route, LIMITS, tubes=True)
+    runs = runs_of(route, LIMITS, tubes=1.0)
     assert 0 < sum(run.tube for run in runs) < len(runs) / 2
     assert not any(run.tube for run in runs_of(route, LIMITS))
+    half = sum(run.tube for run in runs_of(route, LIMITS, tubes=0.5))
+    assert half == pytest.approx(sum(run.tube for run in runs) / 2, abs=1)
     few = replace(
         route, point_mm=route.point_mm[:9], feed_mm_s=route.feed_mm_s[:8], line=route.line[:8],
         tolerance_mm=route.tolerance_mm[:9], dwell_s=route.dwell_s[:9],
     )  # fmt: skip
-    assert all(run.tube for run in runs_of(few, LIMITS, tubes=True))
+    assert all(run.tube for run in runs_of(few, LIMITS, tubes=1.0))
 
 
 def test_a_spline_through_cubics_of_time_is_that_motion() -> None:
