@@ -190,5 +190,11 @@ def test_a_leg_that_is_too_short_between_waypoints_is_found(tmp_path: Path) -> N
     tables = text.split("[axes.")
     tables[leg + 1] = tables[leg + 1].replace("travel_mm = [500.0", f"travel_mm = [{low:.3f}")
     machine.write_text("[axes.".join(tables))
-    found = {one.code: one for one in olp.check_joints(part, machine).findings}
+    with pytest.raises(ProgramError, match=f"command of L{leg + 1} is .*, out of its travel") as refusal:
+        olp.correct_joints(part, machine)
+    assert (refusal.value.line, refusal.value.code) == (3, "OLP567")
+    checked = CliRunner().invoke(main, ["check", str(part), "-m", str(machine), "--json"])
+    assert [one["code"] for one in json.loads(checked.stdout)["findings"]] == ["OLP567"]
+    # one that others corrected
+    found = {one.code: one for one in olp.check_joints(part, machine, nominal=part.read_bytes()).findings}
     assert found["OLP402"].line == 3 and f"L{leg + 1} is commanded" in found["OLP402"].message

@@ -362,7 +362,8 @@ RULES = (
     _rule(
         "OLP567",
         "corrected command out of travel",
-        why="The correction leads an axis beyond its travel, where the control stops with an alarm.",
+        why="The correction leads an axis beyond its travel, at a waypoint or between two, where the control "
+        "stops with an alarm.",
         remedy="Move the part away from the end of the travel, or correct travel_mm "
         "and travel_deg in the machine "
         "file.",

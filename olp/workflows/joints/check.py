@@ -10,7 +10,6 @@ from typing import Any
 
 from olp.checks.base import finding
 from olp.checks.stamps import stamp_findings
-from olp.compensation.joints.path import JointPath
 from olp.compensation.stamp import find_stamp
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
@@ -149,13 +148,13 @@ def _checked(run: JointRun, corrected: Source | None, options: JointOptions) -> 
         what = f"the corrected program against the nominal one ({run.program.short or 'stdin'})"
         found = [_in_corrected(one, done) for one in done.findings]
         found += stamp_findings(corrected.data, run.program.data, run.digest)
-        return _Checked(what, [*found, *_travel(done.corrected)], done)
+        found += placed_findings(travel_findings(Along.of(done.corrected)), done.corrected.program.origin)
+        return _Checked(what, found, done)
     data = run.program.data
     if find_stamp(data) is None:
         done = correction_of(run, options, refuse_doubts=False)
         what = "the result of olp correct on the program"
-        # commands at waypoints are refused beyond the travel; between them nominal ones are as good
-        return _Checked(what, [*done.findings, *_travel(done.nominal)], done)
+        return _Checked(what, done.findings, done)
     with run.program.errors():
         path = run.read(run.program, options)[1]
         found = [
@@ -166,10 +165,6 @@ def _checked(run: JointRun, corrected: Source | None, options: JointOptions) -> 
     return _Checked(
         what, [*placed_findings(found, path.program.origin), *stamp_findings(data, None, run.digest)]
     )
-
-
-def _travel(path: JointPath) -> Sequence[Finding]:
-    return placed_findings(travel_findings(Along.of(path)), path.program.origin)
 
 
 def _refused(error: ProgramError, run: JointRun, program: Source, options: JointCheckOptions) -> JointCheck:

@@ -9,8 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from olp.compensation.joints.arm_path import ArmPath
 from olp.compensation.joints.arm_writer import write_arm
+from olp.compensation.joints.commanded import refuse_beyond
 from olp.compensation.joints.list_writer import write_list
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointLimits, JointPlan
@@ -25,6 +28,7 @@ from olp.core.values import dataclass
 from olp.files.sources import Source
 from olp.files.write import write_bytes
 from olp.findings.catalogue import Finding
+from olp.kinematics.correction import beyond_travel
 from olp.program.dialect import Dialect
 from olp.program.program import Program
 from olp.program.robots.dialect import RobotDialect
@@ -33,6 +37,7 @@ from olp.proof.joints import JointProof, prove_joints
 from olp.workflows import real_time
 from olp.workflows.doubt import accepted_of
 from olp.workflows.flatten import UnrollOptions, above_zero
+from olp.workflows.joints.along import Along
 from olp.workflows.joints.doubt import doubted
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.part import judge_part
@@ -166,13 +171,25 @@ def correction_of(run: JointRun, options: JointOptions, *, refuse_doubts: bool =
                 _refuse_outside(nominal, plan, run)
             written = _written(nominal, plan, options.limits())
         text = _stamped(run, dialect, nominal.program, written.text, accepted_of(doubts))
-        return proved(run, source, (nominal, plan), run.again(text, dialect), options, doubts, written.tally)
+        corrected = run.again(text, dialect)
+        done = proved(run, source, (nominal, plan), corrected, options, doubts, written.tally)
+        with nominal.program.errors():
+            _refuse_between(nominal, done)
+        return done
 
 
 def _written(nominal: JointPath, plan: JointPlan, limits: JointLimits) -> WrittenJoints:
     if isinstance(nominal, ArmPath):
         return write_arm(nominal, plan, limits)
     return write_joints(nominal, plan) if nominal.listed is None else write_list(nominal, plan)
+
+
+def _refuse_between(nominal: JointPath, done: ProvedJoints) -> None:
+    """Raises ProgramError with the line of a move along which an axis leaves its travel: at the waypoints all
+    are within, and where the tip is led the axes may swing out between them."""
+    along = Along.of(done.corrected)
+    move = np.searchsorted(done.proof.groups, along.move)
+    refuse_beyond(nominal, move, along.axes, beyond_travel(nominal.motion.structure, along.axes))
 
 
 def _stamped(
