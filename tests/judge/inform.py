@@ -57,11 +57,11 @@ def moves(text: bytes) -> list[Move]:
             key = name[0], int(name[1:])
             assert key not in stated, f"{name} is stated twice"
             stated[key] = np.array([float(value) for value in values.split(",")]), dict(held)
-        elif line[:4] in ("MOVJ", "MOVL", "MOVC"):
-            name, _, tail = line[5:].partition(" ")
+        elif (move := line.removeprefix("S"))[:4] in ("MOVJ", "MOVL", "MOVC"):
+            name, _, tail = move[5:].partition(" ")
             if name[1:].isdigit() and (name[0], int(name[1:])) in stated:
                 numbers, header = stated[name[0], int(name[1:])]
-                found.append(Move(line[3] == "L", name, tail, numbers, header, number))
+                found.append(Move(move[3] == "L", name, tail, numbers, header, number))
     return found
 
 

@@ -13,7 +13,7 @@ from judge.machines import Recipe
 from judge.model import JudgeModel
 
 import olp
-from olp.core.errors import OlpError, ProgramError, Refused
+from olp.core.errors import OlpError, ProgramError
 
 FRAMES = {1: (300.0, 250.0, -300.0, 25.0), 2: (350.0, 200.0, -250.0, 0.0)}
 RECIPE = Recipe(
@@ -202,6 +202,7 @@ def test_moves_to_what_the_run_decides_are_left(tmp_path: Path, statements: list
         (["MOVJ EC00000 VJ=90.0"], False),
         (["MOVJ P001 T0000 VJ=50.00"], False),
         (["MOVJ P001 VJ=5.00 UNTIL IN#(1)=ON"], True),
+        (["MOVL P001 V=5.0 SRCH RIN#(1)=ON T=0.10 DIS=5.0"], True),
         (["FOR I000=1 TO 3", "MOVL P001 V=5.0", "NEXT I000"], True),
     ],
 )
@@ -215,11 +216,9 @@ def test_where_moves_begin(zero: Path, statements: list[str], *, told: bool) -> 
     [
         ([], "MOVL C00009 V=5.0", "the position C00009 is not stated"),
         ([P1, P1], "MOVL P001 V=5.0", "the position P001 is stated twice"),
-        ([P1], "MOVC P001 V=5.0", "MOVC is read in runs of three behind MOVL or MOVJ"),
         ([P1], "MOVS P001 V=5.0", "MOVS is a spline"),
-        ([P1], "SMOVL P001 V=5.0", "SMOVL counts from a positioner"),
+        ([P1], "SMOVS P001 V=5.0", "SMOVS counts from a positioner"),
         ([P1], "MOVL P001 V=5.0 +MOVL P001", "`.MOVL` behind a move is not read"),
-        ([P1], "MOVL P001 V=5.0 SRCH RIN#(1)=ON", "`SRCH` behind a move is not read"),
         ([P1.replace("USER\n", "MTOOL\n")], "MOVL P001 V=5.0", "of ///POSTYPE MTOOL; expected PULSE, BASE"),
         ([P1.replace("RECTAN", "PULSE")], "MOVL P001 V=5.0", "which contradict each other"),
         ([P1.replace("///USER 1\n", "")], "MOVL P001 V=5.0", "no ///USER names it"),
@@ -250,24 +249,77 @@ RUN = ["MOVJ C00000 VJ=50.00", "MOVC C00001 V=90.0", "MOVC C00002 V=90.0", "MOVC
 @pytest.mark.parametrize(
     ("moves", "line", "why"),
     [
-        (RUN[:3], 1, "in runs of three"),
-        ([*RUN, "DOUT OT#(1) ON", "MOVC C00000 V=90.0"], 1, "in runs of three"),
-        ([RUN[0], "*A", *RUN[1:]], 2, "in runs of three"),
-        ([*RUN[:3], "CALL JOB:X", RUN[3]], 1, "in runs of three"),
-        ([*RUN, "*A", *RUN[1:]], 5, "in runs of three"),
-        (RUN[1:], 0, "in runs of three"),
-        ([*RUN[:3], RUN[3] + " FPT"], 3, "`FPT` behind a move is not read"),
-        ([*RUN[:3], RUN[3] + " UNTIL IN#(1)=ON"], 3, "an arc with UNTIL"),
-        ([*RUN[:2], "MOVC P001 V=90.0", RUN[3]], 2, "the text does not state P001"),
+        (RUN[:3], 0, "in a run of three"),
+        ([*RUN, "DOUT OT#(1) ON", "MOVC C00000 V=90.0"], 0, "in a run of three"),
+        ([RUN[0], "*A", *RUN[1:]], 1, "in a run of three"),
+        ([*RUN[:3], "CALL JOB:X", RUN[3]], 0, "in a run of three"),
+        ([*RUN, "*A", *RUN[1:]], 0, "in a run of three"),
+        (RUN[1:], -1, "in a run of three"),
+        ([*RUN[:3], RUN[3] + " UNTIL IN#(1)=ON"], 0, "may end before its point"),
+        ([RUN[0], *(f"S{move}" for move in RUN[1:])], 0, "SMOVC counts from a positioner"),
+        ([*RUN[:3], RUN[3] + "  +MOVJ EC00001"], 0, "a positioner may move"),
     ],
 )
-def test_arcs_that_are_not_certain_are_refused(zero: Path, moves: list[str], line: int, why: str) -> None:
-    with pytest.raises(ProgramError, match=re.escape(why)) as error:
-        olp.correct(job(ARC, moves), zero)
-    begin = job(ARC, moves).partition(b"NOP")[0].count(b"\n") + 2
-    own = error.value
-    told = [(r.line, r.message) for r in own.reasons] if isinstance(own, Refused) else [(own.line, str(own))]
-    assert any(place == begin + line and why in message for place, message in told)
+def test_arcs_that_are_not_followed_are_corrected_at_their_points(
+    bent: Path, moves: list[str], line: int, why: str
+) -> None:
+    positions = [*ARC, "///POSTYPE PULSE\n///PULSE\nEC00001=5"]
+    text = job(positions, moves)
+    done = olp.correct(text, bent)
+    place = text[: text.index(b"NOP")].count(b"\n") + 3 + line
+    assert any(why in finding.message and finding.lines[0] == place for finding in done.findings)
+    nominal, written, model = inform.moves(text), inform.moves(done.data), JudgeModel(bent)
+    assert len(written) == len(nominal), "nothing is split"
+    for move, own in zip(nominal, written, strict=True):
+        want = model.command_for(world(move)[None], LEVER)[0]
+        assert np.abs(world(own) - want).max() < 2 * DIGIT
+
+
+def test_an_arc_through_a_point_that_is_left_stays_as_it_is(tmp_path: Path) -> None:
+    """Others would be moved away from that one: behind a label, and where another move goes there, too."""
+    path = machines.shift_machine(tmp_path, (100.0, 0.0, 0.0), recipe=RECIPE)
+    moves = ["MOVJ C00003 VJ=5.00", *RUN[1:2], "MOVC P001 V=90.0", "*A", *RUN[3:]]
+    text = job(ARC, moves)
+    done = olp.correct(text, path)
+    assert any("left as written: the text does not state P001" in f.message for f in done.findings)
+    nominal, written = inform.moves(text), inform.moves(done.data)
+    assert [own.name for own in written] == ["C00004", "C00001", "C00003"]
+    shifts = [np.abs(own.numbers - move.numbers).max() for move, own in zip(nominal, written, strict=True)]
+    assert shifts[0] > 0.05
+    assert shifts[1:] == [0.0, 0.0]
+
+
+def test_words_of_an_arc_that_are_not_known_are_refused(zero: Path) -> None:
+    text = job(ARC, [*RUN[:3], RUN[3] + " FPT"])
+    with pytest.raises(ProgramError, match="`FPT` behind a move is not read") as error:
+        olp.correct(text, zero)
+    assert error.value.line == text[: text.index(b" FPT")].count(b"\n") + 1
+
+
+@pytest.mark.parametrize(
+    ("before", "split"),
+    [
+        (["MOVJ C00000 VJ=5.00  +MOVJ EC00001"], True),
+        (["MOVJ C00000 VJ=5.00  +MOVJ EC00000"], False),
+        (["MOVJ C00000 VJ=5.00  +MOVJ EC00001", "MOVJ EC00000 VJ=5.00  +MOVJ EX00001"], False),
+        (["MOVJ C00000 VJ=5.00  +MOVJ EC00001", "CALL JOB:X"], False),
+        (["MOVJ C00000 VJ=5.00  +MOVJ EC00001", "MOVL C00002 V=5.0"], True),
+    ],
+)  # fmt: skip
+def test_the_path_of_smovl_is_straight_where_the_positioner_stands(
+    bent: Path, before: list[str], *, split: bool
+) -> None:
+    points = [[-60.0, -60.0, 0.0], [60.0, 60.0, 20.0], [-60.0, 0.0, 0.0]]
+    positions = [position(f"C{k:05d}", point) for k, point in enumerate(points)]
+    positions += ["///POSTYPE PULSE\n///PULSE\nEC00000=10", "EC00001=20"]
+    text = job(positions, [*before, "SMOVL C00001 V=20.0  +MOVJ EC00001"])
+    done = olp.correct(text, bent)
+    assert (done.data.count(b"SMOVL") > 1) is split
+    assert any("the path counts from it" in finding.message for finding in done.findings) is not split
+    assert done.report["verdict"]["ok"]
+    last, model = inform.moves(done.data)[-1], JudgeModel(bent)
+    want = model.command_for(world(inform.moves(text)[-1])[None], LEVER)[0]
+    assert np.abs(world(last) - want).max() < 2 * DIGIT
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,13 @@ _VARIABLE = pattern(rb"(?i)(?<![\w$])P(?:X?)(\d{1,5})(?!\d)")
 #: One that is chosen in the run.
 _CHOSEN = pattern(rb"(?i)(?<![\w$])PX?\[")
 _LABEL = pattern(rb"\*([\w-]+)")
-#: A move of a positioner alone.
-STATION_ALONE = pattern(rb"(?i)MOV[JL][ \t]+(?:EC|EX)\d+\b(?!.*\+)")
+_STATION = rb"MOV[JL][ \t]+L?(?:EC|EX)\d+\b"
+#: A move of positioners alone.
+STATION_ALONE = pattern(rb"(?i)" + _STATION + rb"(?!.*\+(?!" + _STATION + rb"))")
+#: Moves of an arc.
+ARC_MOVES = frozenset((b"MOVC", b"SMOVC"))
+#: Moves behind which an arc begins.
+_LEADING = frozenset((b"MOVL", b"MOVJ", b"SMOVL"))
 #: Moves that an arc consists of.
 _POINTS = 3
 #: Statements behind which the next one does not follow, unless they have a condition.
@@ -32,24 +37,36 @@ def word_of(text: bytes) -> bytes:
 
 class Arcs:
     """The arcs of a job: `points` are the three moves (MOVC) of each, by the line of each. Another move of
-    the robot stands before them, and no fourth one behind. Nothing between leads elsewhere. `parting`
-    are the lines of moves that only part an arc from the next one, which begins where it ends."""
+    the robot stands before them, and no fourth one behind. Nothing between leads elsewhere. `runs` are all
+    moves (MOVC, SMOVC) with no other move between, however many, and whatever else is. `parting` are the
+    lines of moves that only part an arc from the next one, which begins where it ends."""
 
     def __init__(self, statements: Sequence[Statement]) -> None:
         self.points: dict[int, tuple[Statement, ...]] = {}
+        self.runs: dict[int, tuple[Statement, ...]] = {}
         self.parting: set[int] = set()
         run: list[Statement] = []
         before: list[Statement] = []
         led: Statement | None = None
         for statement in statements:
             word = word_of(statement.text)
-            if word == b"MOVC":
+            if word in ARC_MOVES:
                 run.append(statement)
             elif word not in STILL:
                 before = self._closed(before, led, run)
-                moves = word in (b"MOVL", b"MOVJ") and STATION_ALONE.match(statement.text) is None
+                moves = word in _LEADING and STATION_ALONE.match(statement.text) is None
                 run, led = [], statement if moves else None
         self._closed(before, led, run)
+        self._gather(statements)
+
+    def _gather(self, statements: Sequence[Statement]) -> None:
+        run: list[Statement] = []
+        for statement in (some for some in statements if _MOVE.match(some.text)):
+            if word_of(statement.text) in ARC_MOVES:
+                run.append(statement)
+                self.runs |= {every.line: tuple(run) for every in run}
+            else:
+                run = []
 
     def _closed(
         self, before: list[Statement], led: Statement | None, run: list[Statement]

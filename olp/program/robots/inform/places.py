@@ -77,7 +77,7 @@ class Places:
         around = ((begin, begin), (end, end)) if words[0] == words[0] else ()
         index = self.moves.target(
             position.line, position.span, (x, y, z), (a, b, c), of_zyx((k, j, i)), outer,
-            self._name(position), position.span, (rx, ry, rz), around, words, outer,
+            self.name(position), position.span, (rx, ry, rz), around, words, outer,
             self._copy(position, beside),
         )  # fmt: skip
         self._targets[position.line] = index, used
@@ -108,7 +108,7 @@ class Places:
         a, b, c, d, e, f = degrees
         index = self.moves.joint_target(
             position.line, position.span, [span for span, _ in numbers[:_NUMBERS]], (a, b, c, d, e, f), outer,
-            self._name(position), position.span, counts, self._copy(position, beside),
+            self.name(position), position.span, counts, self._copy(position, beside),
         )  # fmt: skip
         self._targets[position.line] = index, used
         return index
@@ -166,7 +166,8 @@ class Places:
         x, y, z = (base * part for part in track)
         return world.holding(f"ROBOT {base:g}", Pose((x, y, z)))
 
-    def _name(self, position: Position) -> str:
+    def name(self, position: Position) -> str:
+        """The name of a position as its declaration has it."""
         text = self.data[slice(*position.span)]
         return text[: text.index(b"=")].strip().decode("latin-1")
 

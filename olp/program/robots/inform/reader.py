@@ -15,7 +15,7 @@ from olp.core.values import dataclass
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
-from olp.program.robots.inform.flow import STATION_ALONE, Arcs, Flow, word_of
+from olp.program.robots.inform.flow import ARC_MOVES, STATION_ALONE, Arcs, Flow, word_of
 from olp.program.robots.inform.places import Places
 from olp.program.robots.inform.table import BLOCKS, BY_DISTANCE, MOVING, REFUSED, SETTING, STILL
 from olp.program.robots.inform.text import Position, Statement, job_of
@@ -23,12 +23,12 @@ from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose
 from olp.program.robots.targets import Span, Use
 
-_MOVE = pattern(rb"(?i)MOV[LJC][ \t]+((C|P)(\d{1,6})|L?PX?\d+|L?P(?:\[[^\]]*\]|\([^)]*\)))(?![\w\[(])(.*)")
+_MOVE = pattern(rb"(?i)S?MOV[LJC][ \t]+((C|P)(\d{1,6})|L?PX?\d+|L?P(?:\[[^\]]*\]|\([^)]*\)))(?![\w\[(])(.*)")
 _VALUE = rb"(?:\d+\.?\d*|\.\d+|L?[BIDR](?:\d+|\[[^\]]*\]))"
 #: Words behind a move that change nothing of its path, and those that belong to all of it.
 _PLAIN = rb"(?:V[JRE]?|PL|CR|ACC|DEC)=" + _VALUE + rb"|CONT"
 _OUTER = rb"(?:BC|EC|BP|EX)\d+"
-_HELD = rb"NWAIT|T\d+|T=" + _VALUE + rb"|UNTIL[ \t].*"
+_HELD = rb"NWAIT|T\d+|T=" + _VALUE + rb"|(?:UNTIL|SRCH)[ \t].*"
 _STATION = rb"\+MOV[JL][ \t]+(?:EC|EX)\d+"
 _TAIL = pattern(
     rb"(?i)(?:[ \t]*(?:"
@@ -43,11 +43,15 @@ _TAIL = pattern(
 )
 _WHOLE = pattern(rb"(?i)(?<!\w)(?:" + _HELD + rb"|(?:BP|EX)\d)")
 _AXES_BESIDE = pattern(rb"(?i)(?<!\w)(BC|EC|BP|EX)(\d+)")
-_UNTIL = pattern(rb"(?i)(?<!\w)UNTIL[ \t]")
+#: What ends a move before its position is reached.
+_UNTIL = pattern(rb"(?i)(?<!\w)(?:UNTIL|SRCH)[ \t]")
 _SPEED = pattern(rb"(?i)(?<!\w)V=(\d+\.?\d*|\.\d+)(?![\w.])")
 _LEVEL = pattern(rb"(?i)(?<!\w)PL=\S+")
 #: A stop at a via point, or one that may be, and a rounding, which several arcs do not have.
 _STOPS = pattern(rb"(?i)(?<!\w)(?:PL=(?![1-9]\d*(?!\S))|CR=)")
+_MOVES = frozenset((b"MOVL", b"MOVJ", b"SMOVL"))
+#: Moves whose path counts from a positioner, where one moves.
+_WITH_STATION = frozenset((b"SMOVL", b"SMOVC"))
 #: Words of a posture that are the same all along an arc: those of the arm.
 _ARM = slice(1, 3)
 _WORD = pattern(rb"[\w.+#=]+|\S")
@@ -79,7 +83,10 @@ class _Reader:
         self.flow = Flow(self.job.statements)
         self.arcs = Arcs(self.job.statements)
         self.places = Places(data, self.moves, self.job)
-        self.station: tuple[float, ...] = ()
+        #: where the positioner is, None where that is not known
+        self.station: tuple[float, ...] | None = ()
+        #: of the arc that is read, as `_why_unled` says
+        self._unled: str | None = None
         self.blocks: list[_Block] = []
         self.refusals: list[ProgramError] = []
 
@@ -93,11 +100,14 @@ class _Reader:
         word = word_of(statement.text)
         if word in REFUSED:
             raise not_read(f"{word.decode()} {REFUSED[word]}", statement.line)
-        if STATION_ALONE.match(statement.text) or statement.line in self.arcs.parting:
+        if STATION_ALONE.match(statement.text):
+            self.station = None
             return
-        if word in (b"MOVL", b"MOVJ"):
-            self._move(statement, straight=word == b"MOVL")
-        elif word == b"MOVC":
+        if statement.line in self.arcs.parting:
+            return
+        if word in _MOVES:
+            self._move(statement, straight=word != b"MOVJ")
+        elif word in ARC_MOVES:
             self._arc(statement)
         elif word in BY_DISTANCE:
             self.moves.left(statement.line)
@@ -129,42 +139,72 @@ class _Reader:
 
     # -- moves ---------------------------------------------------------------------------------------
 
-    def _move(self, statement: Statement, *, straight: bool) -> None:
+    def _move(self, statement: Statement, *, straight: bool, whole: bool = False, left: str = "") -> None:
+        """A move; `left` says why it stays as it is written, where its own words do not."""
         move = self._words(statement)
         tail = move[4]
         if any(block.loop and block.moves == self.moves.count for block in self.blocks):
             # the first move in a loop begins where the last one ends, or before the loop
             self.moves.known = False
         position, why = self._position(move[2], move[3], statement)
-        if position is None:
+        if position is None or left:
             self.moves.left(statement.line)
-            self.moves.remark("left", statement.line, f"left as written: {why}")
+            if position is not None:
+                self.moves.hold((self.places.name(position),))
+            self.station = None
+            self.moves.remark("left", statement.line, f"left as written: {why or left}")
             return
+        self._known_words(tail, statement)
         if move[2].upper() == b"P":
             what = f"{move[1].decode()} may be used by other jobs, too: correct these with it"
             self.moves.remark("shared", statement.line, what)
         begin = statement.span[0]
         place = begin + move.start(1), begin + move.end(1)
         speed = _SPEED.search(tail)
-        whole = _WHOLE.search(tail) is not None
+        whole |= _WHOLE.search(tail) is not None
         self._to(statement, position, place, tail, NAN if speed is None else float(speed[1]),
                  straight=straight, whole=whole)  # fmt: skip
         if _UNTIL.search(tail):
             self.moves.known = False
 
     def _arc(self, statement: Statement) -> None:
-        """One of the three moves of an arc, which begins at the first one and is read with the second."""
-        run = self.arcs.points.get(statement.line, ())
-        if not run:
-            raise not_read(
-                "MOVC is read in runs of three behind MOVL or MOVJ, with nothing between that leads "
-                "elsewhere; post each arc as three MOVC, and a MOVL to where it begins before them",
-                statement.line,
-            )
+        """One of the moves of an arc. Three of them that can be followed are read with the second one. Others
+        are corrected where they go, and their path is not known."""
+        run = self.arcs.runs[statement.line]
         if statement is run[0]:
+            self._unled = self._why_unled(run)
+        if self._unled is not None:
+            self._move(statement, straight=False, whole=True, left=self._unled)
+        elif statement is run[0]:
             self._move(statement, straight=True)
         elif statement is run[1]:
             self._bent(run)
+
+    def _why_unled(self, run: tuple[Statement, ...]) -> str | None:
+        """None where the path of an arc is followed; else why its points are left, empty where they are
+        corrected."""
+        moves = [self._words(own) for own in run]
+        stated = [self._position(move[2], move[3], own) for move, own in zip(moves, run, strict=True)]
+        positions = [position for position, _ in stated if position is not None]
+        if len(positions) < len(run):
+            return next(why for position, why in stated if position is None)
+        if any(word_of(own.text) in _WITH_STATION for own in run):
+            why = "the path of SMOVC counts from a positioner"
+        elif self.arcs.points.get(run[0].line) != run:
+            why = (
+                "an arc is followed in a run of three MOVC behind MOVL or MOVJ, with nothing between that "
+                "leads elsewhere"
+            )
+        elif any(self.places.in_joints(position, run[0].line) for position in positions):
+            why = "a point of this arc is in pulses or joints"
+        elif any(_UNTIL.search(move[4]) for move in moves):
+            why = "this arc may end before its point"
+        elif any(kind == b"EC" for move in moves for kind, _ in self._beside(move[4])):
+            why = "a positioner may move along this arc"
+        else:
+            return None
+        self.moves.remark(f"points: {why}", run[0].line, f"{why}: it is corrected at its points")
+        return ""
 
     def _bent(self, run: tuple[Statement, ...]) -> None:
         """An arc from the first of its moves through the second to the third."""
@@ -190,24 +230,14 @@ class _Reader:
     def _point(self, statement: Statement) -> tuple[Use, Located, Tool]:
         """A point of an arc, with its frame and its tool."""
         move, line, begin = self._words(statement), statement.line, statement.span[0]
-        position, why = self._position(move[2], move[3], statement)
-        if position is None:
-            raise not_read(f"an arc through a point that is left as written: {why}", line)
-        if self.places.in_joints(position, line):
-            raise not_read(
-                "this point of an arc is in pulses or joints; save the job in base coordinates "
-                "(///POSTYPE BASE)",
-                line,
-            )
-        if _UNTIL.search(move[4]) or b"+" in move[4]:
-            raise not_read("an arc with UNTIL, or with a positioner that moves, is not read", line)
+        position, _ = self._position(move[2], move[3], statement)
+        assert position is not None
+        self._known_words(move[4], statement)
         if move[2].upper() == b"P":
             what = f"{move[1].decode()} may be used by other jobs, too: correct these with it"
             self.moves.remark("shared", line, what)
         beside = self._beside(move[4])
         index = self.places.target(position, beside, line)
-        if self.places.station(beside, line) != self.station:
-            raise not_read("a positioner moves along this arc; program straight moves", line)
         target = self.moves.targets[index]
         place = begin + move.start(1), begin + move.end(1)
         use = Use(index, statement.span, place, place, turn=target.turn, zone=(place[1], statement.span[1]))
@@ -223,7 +253,6 @@ class _Reader:
         move = _MOVE.fullmatch(statement.text)
         if move is None:
             raise ProgramError("the words of this move are not read", line=statement.line, code="OLP516")
-        self._known_words(move[4], statement)
         return move
 
     def _to(
@@ -234,9 +263,15 @@ class _Reader:
         line, span = statement.line, statement.span
         beside = self._beside(tail)
         zone, station = (place[1], span[1]), self.places.station(beside, line)
-        # parts would lead a positioner to its end before the move ends
-        whole |= station != self.station
-        self.station = station
+        if station:
+            # parts would lead a positioner to its end before the move ends
+            moved = station != self.station or not self.moves.known
+            whole |= moved
+            self.station = station
+            if moved and straight and word_of(statement.text) in _WITH_STATION:
+                what = "a positioner moves, and the path counts from it: the move is corrected at its end"
+                self.moves.remark("station", line, what)
+                straight = False
         if self.places.in_joints(position, line):
             held: Tool | None = None
             if straight and self.moves.arm:

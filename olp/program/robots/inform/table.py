@@ -15,7 +15,7 @@ _NO = Support.REFUSED
 REFUSED: Mapping[bytes, str] = {
     b"MOVS": "is a spline, which is not read; post straight moves (MOVL)",
     **dict.fromkeys(
-        (b"SMOVL", b"SMOVC", b"SMOVS", b"EMOVL", b"EMOVC"),
+        (b"SMOVS", b"EMOVL", b"EMOVC"),
         "counts from a positioner or another robot, whose place is not stated; post the job without it",
     ),
 }
@@ -57,7 +57,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"MOVL": (_C, "a straight move to a taught position (C) or a position variable (P)"),
     b"MOVJ": (_C, "corrected at its end; the path of the joints is not judged"),
     b"C00000=, P000=": (_C, "changed where moves use it, and cloned where they differ"),
-    b"MOVC": (_C, "three behind MOVL or MOVJ: straight to the first, an arc through the second to the third"),
+    b"MOVC": (_C, "three behind a move: straight to the first, then an arc; others: corrected at points"),
     b"///RECTAN": (_R, "positions X, Y, Z, Rx, Ry, Rz in mm and deg"),
     b"///PULSE": (_R, "positions in pulses: corrected on arms that state pulses_per_deg, else kept"),
     b"///ANGLE": (_R, "joints in degrees: corrected on arms, else kept"),
@@ -69,7 +69,9 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"BC00000=, EC00000=": (_R, "kept; a move during which one changes is never split"),
     b"V=": (_R, "the speed, in mm/s"),
     b"PL=": (_R, "parts of a move are passed"),
-    b"UNTIL, NWAIT, T=, T0000": (_R, "the move is never split"),
+    b"SMOVL": (_C, "as MOVL; corrected at its end where a positioner moves, from which its path counts"),
+    b"SMOVC": (_C, "corrected at its points, as its path counts from a positioner"),
+    b"UNTIL, SRCH, NWAIT, T=, T0000": (_R, "the move is never split"),
     b"+MOVJ EC": (_R, "a positioner moves at the same time; each part states where it is"),
     b"VJ=, VR=, ACC=, DEC=, CR=, CONT": (_X, ""),
     b"SFTON, COMARCON, SYSTART": (_R, "the moves up to SFTOF, COMARCOF, SYEND are left as written"),
