@@ -526,27 +526,45 @@ def test_a_tool_that_does_not_turn_evenly_is_refused_in_krl(
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        (["SingArea\\Wrist"], 8),
         (["SingArea \\LockAxis4"], 8),
-        (["SingArea\\Wrist", "SingArea\\Off"], 0),
-        (["IF a THEN", "SingArea\\Wrist", "ELSE", "SingArea\\Off", "ENDIF"], 12),
-        (["made2", "ENDPROC", "PROC made2()", "SingArea\\Off", "SingArea\\Wrist"], 12),
+        (["SingArea\\Wrist", "ConfL\\Off"], 9),
+        (["SingArea\\Wrist", "SingArea\\Off", "ConfL\\Off"], 0),
+        (["IF a THEN", "SingArea\\LockAxis4", "ELSE", "SingArea\\Wrist", "ENDIF"], 12),
+        (["IF a THEN", "SingArea\\Wrist", "ELSE", "SingArea\\LockAxis4", "ENDIF"], 12),
+        (["made2", "ENDPROC", "PROC made2()", "SingArea\\Off", "SingArea\\LockAxis4"], 12),
     ],
 )
 def test_a_tool_that_does_not_turn_evenly_is_refused_in_rapid(
     words: list[str], line: int, tmp_path: Path
 ) -> None:
-    text = rapid([("P", JOINTS), ("L", JOINTS + 1.0)]).decode()
-    text = text.replace(
-        "  MoveL", "".join(f"{word}{'' if word[0] in 'IEP' else ';'}\n" for word in words) + "  MoveL"
-    )
-    machine = arm_files(tmp_path)
+    text, machine = with_words(words, JOINTS + 1.0), arm_files(tmp_path)
     if not line:
-        assert olp.correct_joints(text.encode(), machine).report["verdict"]["ok"]
+        assert olp.correct_joints(text, machine).report["verdict"]["ok"]
         return
     with pytest.raises(ProgramError, match=r"program SingArea\\Off before it") as caught:
-        olp.correct_joints(text.encode(), machine)
+        olp.correct_joints(text, machine)
     assert caught.value.line == line
+
+
+def with_words(words: list[str], joints: np.ndarray) -> bytes:
+    """A move to a pose, statements, and a straight move."""
+    own = "".join(f"{word}{'' if word[0] in 'IEP' else ';'}\n" for word in words)
+    return rapid([("P", JOINTS), ("L", joints)]).replace(b"  MoveL", own.encode() + b"  MoveL")
+
+
+def test_a_wrist_that_may_turn_otherwise_keeps_moves_of_rapid_whole(tmp_path: Path) -> None:
+    """A long one is corrected at its end alone, where the program says that the tool is."""
+    far, machine = JOINTS + np.array([8.0, 5.0, -6.0, 7.0, 5.0, -9.0]), arm_files(tmp_path)
+    found = {}
+    for area in ("Wrist", "Off"):
+        text = with_words([f"SingArea\\{area}"], far)
+        result = olp.correct_joints(text, machine)
+        found[area] = READERS["rapid"](result.data, FRAMES)
+        told = [f.lines for f in result.findings if "corrected at their points" in f.message]
+        assert told == ([(8,)] if area == "Wrist" else [])
+    assert len(found["Wrist"]) == 2 < len(found["Off"])
+    assert np.abs(found["Wrist"][-1].tip - found["Off"][-1].tip).max() < 2e-4
+    assert np.abs(found["Wrist"][-1].turn - found["Off"][-1].turn).max() < 1e-8
 
 
 def tp_of(joints: np.ndarray, config: str, kind: str = "P") -> bytes:

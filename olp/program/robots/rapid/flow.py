@@ -97,6 +97,11 @@ def area_of(statement: Statement) -> str:
     return "" if match is None else match[1].decode("latin-1")
 
 
+def locks(area: str) -> bool:
+    """Whether a switch of `SingArea` turns the tool otherwise at the end of a move, too."""
+    return area.upper() == "LOCKAXIS4"
+
+
 def arc_mode_of(statement: Statement) -> str:
     """By which switch of `CirPathMode` the tool turns otherwise on arcs than from their start to their end;
     empty for others."""
@@ -113,6 +118,17 @@ def first_of(
         return "", 0
     said = ((say(statement), statement.line) for statement in statements)
     return next((each for each in said if each[0]), ("", 0))
+
+
+def first_area(data: bytes, statements: Sequence[Statement]) -> tuple[str, int]:
+    """The first switch of `SingArea`, with its line, and before it one that `locks`; as `first_of`."""
+
+    def locking(statement: Statement) -> str:
+        area = area_of(statement)
+        return area if locks(area) else ""
+
+    found = first_of(locking, b"SINGAREA", data, statements)
+    return found if found[0] else first_of(area_of, b"SINGAREA", data, statements)
 
 
 def may_move(text: bytes) -> bool:

@@ -76,7 +76,7 @@ class _Reader:
         every = list(statements(self.data, Lines(self.data)))
         rest = self._declare(every)
         self.moving, self.routines = flow.moving_routines(rest)
-        self.any_area = flow.first_of(flow.area_of, b"SINGAREA", self.data, rest)
+        self.any_area = flow.first_area(self.data, rest)
         self.arc_mode = flow.first_of(flow.arc_mode_of, b"CIRPATHMODE", self.data, rest)
         take_all(rest, self._statement, self.moves, self.refusals, options)
         self.moves.hold_mentioned((statement.begin, statement.end) for statement in every)
@@ -235,7 +235,12 @@ class _Reader:
         feed = self.declared.speed(stated, self.routine)
         self._loop_begins()
         whole |= form.whole or not _PATHS.isdisjoint(words.others)
-        if form.arc:
+        if self._uneven(form):
+            what = f"the tool may not turn evenly here (SingArea\\{self.area[0]} in line {self.area[1]})"
+            self.moves.remark("area", line, f"{what}: lines and arcs are corrected at their points")
+            for use in uses:
+                self.moves.move(line, use, frame, tool, feed, straight=False, whole=True)
+        elif form.arc:
             self.moves.arc(line, uses[0], uses[1], frame, tool, feed, whole=whole)
         else:
             self.moves.move(line, uses[0], frame, tool, feed, straight=form.straight, whole=whole)
@@ -254,14 +259,19 @@ class _Reader:
             raise ProgramError(
                 f"a move with \\{unread[0].decode('latin-1')} is not read", line=line, code=_NOT_READ
             )
-        if form.straight and self.moves.arm and self.area[0]:
+        if self._uneven(form) and (self.free[0] or flow.locks(self.area[0])):
             what = f"SingArea\\{self.area[0]} in line {self.area[1]}"
+            what += ", with ConfL\\Off" if self.free[0] else ""
             raise ProgramError(
                 f"the tool may not turn evenly on this move ({what}), which is not read on arms; program "
                 "SingArea\\Off before it",
                 line=line,
                 code=_NOT_READ,
             )
+
+    def _uneven(self, form: Form) -> bool:
+        """Whether the tool of a move along a line or an arc may not turn evenly."""
+        return form.straight and self.moves.arm and self.area[0] != ""
 
     def _tool(self, name: str, line: int) -> Tool:
         key = (self.routine, name)

@@ -38,7 +38,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"MODULE": (_X, ""),
     b"CIRPATHMODE": (_R, "with CirPointOri or Wrist45 ... an arc is refused"),
     b"SOFTACT": (_R, "the axes are soft from here on: what the load does to the path is not corrected"),
-    b"SINGAREA": (_R, "with Wrist or LockAxis4 a straight move of an arm is refused"),
+    b"SINGAREA": (_R, "with Wrist a straight move of an arm is corrected at its end, with LockAxis4 refused"),
     b"PROC": (_R, "where its first move comes from is not known: it is corrected at its end"),
     b"IF": (_R, "behind moves that may not run, the next one is corrected at its end"),
     b"CALL": (_R, "behind a routine that may move, the next move is corrected at its end"),
