@@ -258,6 +258,7 @@ RUN = ["MOVJ C00000 VJ=50.00", "MOVC C00001 V=90.0", "MOVC C00002 V=90.0", "MOVC
         ([*RUN[:3], RUN[3] + " UNTIL IN#(1)=ON"], 0, "may end before its point"),
         ([RUN[0], *(f"S{move}" for move in RUN[1:])], 0, "SMOVC counts from a positioner"),
         ([*RUN[:3], RUN[3] + "  +MOVJ EC00001"], 0, "a positioner may move"),
+        ([*RUN[:3], RUN[3] + "  +MOVJ LEX000"], 0, "a positioner may move"),
     ],
 )
 def test_arcs_that_are_not_followed_are_corrected_at_their_points(
@@ -303,6 +304,8 @@ def test_words_of_an_arc_that_are_not_known_are_refused(zero: Path) -> None:
         (["MOVJ C00000 VJ=5.00  +MOVJ EC00000"], False),
         (["MOVJ C00000 VJ=5.00  +MOVJ EC00001", "MOVJ EC00000 VJ=5.00  +MOVJ EX00001"], False),
         (["MOVJ C00000 VJ=5.00  +MOVJ EC00001", "CALL JOB:X"], False),
+        (["MOVJ C00000 VJ=5.00  +MOVJ LEX000"], False),
+        (["MOVJ C00000 VJ=5.00  +MOVJ EC00001", "MOVJ C00002 VJ=5.00  +MOVJ LEX000"], False),
         (["MOVJ C00000 VJ=5.00  +MOVJ EC00001", "MOVL C00002 V=5.0"], True),
     ],
 )  # fmt: skip

@@ -29,7 +29,7 @@ _VALUE = rb"(?:\d+\.?\d*|\.\d+|L?[BIDR](?:\d+|\[[^\]]*\]))"
 _PLAIN = rb"(?:V[JRE]?|PL|CR|ACC|DEC)=" + _VALUE + rb"|CONT"
 _OUTER = rb"(?:BC|EC|BP|EX)\d+"
 _HELD = rb"NWAIT|T\d+|T=" + _VALUE + rb"|(?:UNTIL|SRCH)[ \t].*"
-_STATION = rb"\+MOV[JL][ \t]+(?:EC|EX)\d+"
+_STATION = rb"\+MOV[JL][ \t]+L?(?:EC|EX)\d+"
 _TAIL = pattern(
     rb"(?i)(?:[ \t]*(?:"
     + _PLAIN
@@ -41,7 +41,10 @@ _TAIL = pattern(
     + _STATION
     + rb")(?![\w=(\[]))*[ \t]*"
 )
-_WHOLE = pattern(rb"(?i)(?<!\w)(?:" + _HELD + rb"|(?:BP|EX)\d)")
+_WHOLE = pattern(rb"(?i)(?<!\w)(?:" + _HELD + rb"|L?(?:BP|EX)\d)")
+#: A positioner that goes somewhere, and one that goes where the text does not state.
+_STATIONED = pattern(rb"(?i)(?<!\w)L?E[CX]\d")
+_SOMEWHERE = pattern(rb"(?i)(?<!\w)L?EX\d")
 _AXES_BESIDE = pattern(rb"(?i)(?<!\w)(BC|EC|BP|EX)(\d+)")
 #: What ends a move before its position is reached.
 _UNTIL = pattern(rb"(?i)(?<!\w)(?:UNTIL|SRCH)[ \t]")
@@ -199,7 +202,7 @@ class _Reader:
             why = "a point of this arc is in pulses or joints"
         elif any(_UNTIL.search(move[4]) for move in moves):
             why = "this arc may end before its point"
-        elif any(kind == b"EC" for move in moves for kind, _ in self._beside(move[4])):
+        elif any(_STATIONED.search(move[4]) for move in moves):
             why = "a positioner may move along this arc"
         else:
             return None
@@ -263,11 +266,12 @@ class _Reader:
         line, span = statement.line, statement.span
         beside = self._beside(tail)
         zone, station = (place[1], span[1]), self.places.station(beside, line)
-        if station:
+        somewhere = _SOMEWHERE.search(tail) is not None
+        if station or somewhere:
             # parts would lead a positioner to its end before the move ends
-            moved = station != self.station or not self.moves.known
+            moved = somewhere or station != self.station or not self.moves.known
             whole |= moved
-            self.station = station
+            self.station = None if somewhere else station
             if moved and straight and word_of(statement.text) in _WITH_STATION:
                 what = "a positioner moves, and the path counts from it: the move is corrected at its end"
                 self.moves.remark("station", line, what)
