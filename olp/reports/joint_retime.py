@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from olp.reports.report import Report, pairs, place, sentences, table
-from olp.reports.retime import against_text, clock, feeds_text, gains_text, study_text
+from olp.reports.retime import against_text, clock, feeds_text, gains_text, study_text, tubes_text
 
 
 def to_text(report: Report) -> str:
@@ -34,6 +34,7 @@ def _head(report: Report) -> Iterator[str]:
             ("Limits", f"used at most: {kept}"),
             ("Path", f"corners within {report['blend_mm']:g} mm where the program names no tolerance"),
             ("Planned by", solvers),
+            ("In tubes", tubes_text(report["in_tubes"])),
             (
                 "Stretches",
                 f"{stretches}, between moves that the control makes by itself" if stretches > 1 else "",

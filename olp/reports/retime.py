@@ -38,7 +38,7 @@ def to_text(report: Report) -> str:
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
 
 
-def _in_tubes(found: Report) -> str:
+def tubes_text(found: Report) -> str:
     """Why searches for a faster motion found none; nothing where all did."""
     vain = found["not_faster"]
     causes = ", ".join(f"{cause} ({count})" for cause, count in vain.items())
@@ -67,7 +67,7 @@ def _head(report: Report) -> Iterator[str]:
             ),
             ("Limits", f"used at most: {kept}"),
             ("Planned by", f"{solvers}; {_percent(report['ruckig_share'], 1)} of the motion by Ruckig"),
-            ("In tubes", _in_tubes(report["in_tubes"])),
+            ("In tubes", tubes_text(report["in_tubes"])),
             (
                 "Stretches",
                 f"{len(stretches)}, between moves that the control makes by itself"

@@ -10,8 +10,9 @@ from olp.compensation.joints.motion import Motion
 from olp.core.arrays import Array, Index
 from olp.core.progress import Progress
 from olp.core.values import dataclass
+from olp.trajectory.contest import stops_of
 from olp.trajectory.from_joints import JointRoute
-from olp.trajectory.plan import Trajectory, plan
+from olp.trajectory.plan import Trajectory, plan, with_stops
 from olp.trajectory.route import AxisLimits
 
 #: Rounds in which feeds are lowered where the tip is faster than its feed.
@@ -21,6 +22,8 @@ _ROUNDS = 5
 _FASTER = 1e-3
 #: Samples of a piece of the motion at which the tip is looked at, as shares of its time.
 _SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+#: Why no run is searched for a faster motion in a tube.
+NO_TUBES = "a tube bounds axes, and here feed and tolerance are those of the tip"
 #: Pieces that are looked at together.
 _BLOCK = 1 << 14
 
@@ -43,6 +46,10 @@ class Stretch:
         motion = replace(pieces, path=pieces.path / scale, line=self.route.line[pieces.line])
         bounds = AxisLimits(limits.velocity / scale, limits.acceleration / scale, limits.jerk / scale)
         return replace(found, motion=motion, limits=bounds)
+
+    def turning(self) -> int:
+        """How many runs between rests have a waypoint, where a tube might make them faster."""
+        return int((np.diff(stops_of(with_stops(self.route.route))) > 1).sum())
 
     def tip_speed(self, position: Array, velocity: Array, segment: Index) -> Array:
         """(n,) mm/s of the tip in the workpiece at (n, axes) positions and velocities in the space of the

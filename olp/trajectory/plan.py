@@ -81,7 +81,7 @@ def plan(
     Raises CannotCompute for a route that is not finite.
     """
     _check(route, limits)
-    route = _with_stops(route)
+    route = with_stops(route)
     legs: list[Leg] = []
     none = np.zeros_like(limits.velocity)
     used = [Ratios(none, none, none, 0.0)]
@@ -131,7 +131,7 @@ def _check(route: Route, limits: AxisLimits) -> None:
             raise CannotCompute(f"the {name} of an axis is not above 0")
 
 
-def _with_stops(route: Route) -> Route:
+def with_stops(route: Route) -> Route:
     """The route with rests at its ends, at dwells, and at waypoints where the path turns back on itself."""
     tolerance = route.tolerance_mm.copy()
     tolerance[:1] = tolerance[-1:] = 0.0

@@ -3,6 +3,7 @@ with own samples and an own forward."""
 
 from __future__ import annotations
 
+import json
 import tomllib
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +18,7 @@ from judge.machines import Recipe, zero_machine
 import olp
 from olp.core.errors import CannotCompute, ConfigError, ProgramError, UsageError
 from olp.trajectory import contest
+from olp.trajectory.joint_motion import NO_TUBES
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.retime import JointRetimeOptions, JointRetiming, retimed
 
@@ -221,7 +223,11 @@ def test_the_verb_writes_table_and_report(tmp_path: Path) -> None:
     head, *rows = out.read_text().splitlines()
     assert head.startswith("t_s,X_mm,Y_mm,Z_mm,C_deg,B_deg,VX_mm_s") and head.endswith(",AB_deg_s2,line")
     assert len(rows) == pytest.approx(5752, abs=5)
-    assert '"schema": "olp-joint-retime-1"' in report.read_text()
+    found = json.loads(report.read_text())
+    assert found["schema"] == "olp-joint-retime-1"
+    # the third run is one straight move
+    assert found["in_tubes"] == {"faster": 0, "not_faster": {NO_TUBES: 2}}
+    assert "2 of 2 runs are no faster: a tube bounds axes" in done.stdout
     done = run("retime", "-j", job, "-o", str(tmp_path / "x.txt"))
     assert done.exit_code == 2 and "ends in no known format" in done.stderr
     done = run("retime", "-j", job, "--controller", "fanuc")

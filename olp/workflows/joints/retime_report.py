@@ -9,7 +9,7 @@ import numpy as np
 from olp.core.arrays import Index
 from olp.kinematics.structure import Structure
 from olp.program.feeds.timing import PathControl, Timing
-from olp.trajectory.joint_motion import Stretch
+from olp.trajectory.joint_motion import NO_TUBES, Stretch
 
 #: Lines of the table of those that take longest.
 LONGEST = 10
@@ -56,10 +56,12 @@ def summary(structure: Structure, stretches: tuple[Stretch, ...], lines: Index) 
             largest[word] = max(largest[word], float(getattr(one.trajectory.audit, word).max()))
     longest = np.argsort(-seconds, kind="stable")[:LONGEST]
     total = float(seconds.sum())
+    turning = sum(one.turning() for one in stretches)
     return {
         "duration_s": total,
         "dwell_s": dwell,
         "solvers_s": solvers,
+        "in_tubes": {"faster": 0, "not_faster": {NO_TUBES: turning} if turning else {}},
         "largest_share_of_limit": largest | {"feed": feed},
         "nearest_limit": {
             name: float(share)
