@@ -45,7 +45,7 @@ def knots(route: Route, limits: AxisLimits, motion: Motion) -> tuple[Array, Inde
     most = np.minimum(lasts / _OF_SEGMENT, passed[-1] / _OF_WHOLE)
     most = np.maximum(most, _finest_s(route.tolerance_mm, limits))
     # only cubics of time meet at knots of a spline
-    own = motion.start_s if motion.time.shape[1] == 4 else passed
+    own = motion.start_s if motion.cubic else passed
     knot_s, segment = [0.0], []
     for k in np.flatnonzero(lasts > _LEAST_S).tolist():
         begin, end, gap = float(passed[k]), float(passed[k + 1]), _SAME * float(most[k])

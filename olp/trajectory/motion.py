@@ -10,6 +10,8 @@ from olp.core.arrays import Array, Index
 from olp.core.values import dataclass
 from olp.trajectory.growing import Growing
 
+#: coefficients of a cubic
+CUBIC = 4
 #: instants at a time: columns of so many stay in the cache
 _BLOCK = 1 << 13
 
@@ -33,6 +35,11 @@ class Motion:
     @property
     def duration_s(self) -> float:
         return float(self.start_s[-1] - self.start_s[0]) if len(self.start_s) else 0.0
+
+    @property
+    def cubic(self) -> bool:
+        """Whether no piece has more than a cubic of time, so that axes may be cubics of time, too."""
+        return bool(self.time.shape[1] == CUBIC)
 
     @property
     def axes(self) -> int:

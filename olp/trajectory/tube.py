@@ -60,9 +60,7 @@ def in_tube(route: Route, limits: AxisLimits, motion: Motion) -> Motion:
     own = Route(route.point_mm[:, moves], route.feed_mm_s, route.line, route.tolerance_mm, route.dwell_s)
     some = AxisLimits(*(limit[moves] for limit in (limits.velocity, limits.acceleration, limits.jerk)))
     flat = Motion(motion.start_s, motion.time, motion.path[:, :, moves], motion.shape, motion.line)
-    spline, tube, segment = _spline(own, some, flat)
-    spline = tube.inside(spline)
-    spline = spline.slowed(_SLOWED * tube.excess(spline))
+    spline, tube, segment = _start(own, some, flat)
     tube = tube.from_here(spline)
     found = least_time(spline, tube.bounds, float(own.tolerance_mm[1:-1].min()))
     if found.duration_s >= motion.duration_s or not tube.forward(found):
@@ -72,6 +70,32 @@ def in_tube(route: Route, limits: AxisLimits, motion: Motion) -> Motion:
     path[:, 0] = route.point_mm[0]
     path[:, :, moves] = planned.path
     return Motion(planned.start_s, planned.time, path, planned.shape, planned.line)
+
+
+def _start(route: Route, limits: AxisLimits, motion: Motion) -> tuple[TimeSpline, _Tube, Index]:
+    """The spline from which the search begins, its tube, and the segments of its cells. A motion that cannot
+    be pulled inside with new cells keeps its own. Raises CannotCompute."""
+    spline, tube, segment = _spline(route, limits, motion)
+    try:
+        spline = tube.inside(spline)
+        return spline.slowed(_SLOWED * tube.excess(spline)), tube, segment
+    except CannotCompute:
+        own = _itself(route, limits, motion)
+        if own is None:
+            raise
+        return own
+
+
+def _itself(route: Route, limits: AxisLimits, motion: Motion) -> tuple[TimeSpline, _Tube, Index] | None:
+    """The same with the cells of the motion itself; None where that is not inside. One that was searched in
+    a tube is: it may be as near to the bounds as no pull leaves it."""
+    if not motion.cubic or (np.diff(motion.start_s) <= 0.0).any():
+        return None
+    tube, spline = _Tube.of(route, limits, motion.line), TimeSpline.through(motion, motion.start_s)
+    spline = spline.slowed(_SLOWED * tube.excess(spline))
+    bounds = tube.from_here(spline).bounds(spline, False)
+    inside = all((group.slack() > 0.0).all() for group in bounds)
+    return (spline, tube, motion.line) if inside else None
 
 
 def _spline(route: Route, limits: AxisLimits, motion: Motion) -> tuple[TimeSpline, _Tube, Index]:

@@ -10,6 +10,7 @@ from cases.joint_optimum import corner, jog
 from judge.retiming import judge
 
 from olp.core.errors import CannotCompute
+from olp.trajectory import descent, tube
 from olp.trajectory.overlap import overlap
 from olp.trajectory.plan import plan
 from olp.trajectory.route import AxisLimits, Route
@@ -108,6 +109,23 @@ def test_a_motion_may_turn_with_its_route_and_not_twice(middle: tuple[float, ...
     tube = _Tube.of(route, LIMITS, np.repeat([0, 1], 4))
     x = np.concatenate((np.zeros(3), middle, np.full(3, 0.5)))
     assert tube.forward(TimeSpline(np.column_stack((x, 0.0 * x, 0.1 * x)), np.ones(8))) is good
+
+
+@pytest.mark.slow
+def test_a_search_goes_on_from_a_motion_that_cannot_be_pulled_inside(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that a search has found may touch bounds on all sides. It is inside with its own cells."""
+    route = replace(route_of(corner(45.0, 3.0), 0.1), line=np.arange(2))
+    first = overlap(route, LIMITS)
+    with monkeypatch.context() as few:
+        few.setattr(descent, "_STEPS", 12)
+        found = in_tube(route, LIMITS, first)
+    monkeypatch.setattr(tube, "_PULLS", 0)
+    again = in_tube(route, LIMITS, found)
+    assert judge(again, route, LIMITS).wrong == ()
+    assert again.duration_s < 0.999 * found.duration_s
+    # what is not inside is no start
+    with pytest.raises(CannotCompute, match="not inside the tube"):
+        in_tube(route, LIMITS, first)
 
 
 def test_points_that_are_one_and_rapids_are_driven() -> None:
