@@ -9,6 +9,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal
 
+from olp.core.parameters import NAMES
 from olp.core.patterns import pattern
 from olp.core.schema import Interval, NotNegative, Position, Positive, Table, Text, Triple
 from olp.core.schema_keys import Field, Known, refusal, rule
@@ -282,8 +283,6 @@ class StylusTable(Table):
     )
 
 
-#: A parameter of a program, by its number or its name.
-_PARAMETER = pattern(r"#(\d{1,5}|<[^<>]+>)|(?:Q[LR]?|R)\d{1,5}")
 Styli = dict[Text, StylusTable]
 WorkOffsets = dict[OffsetName, WorkOffsetTable]
 Tools = dict[ToolNumber, ToolTable]
@@ -491,7 +490,8 @@ class JobFile(Table):
     parameters: dict[Text, float] = Field(
         default={},
         description="the table [parameters]: values that parameters of the program have in the control, such "
-        'as "#100" = 5.0, "#<depth>" = 2.5, Q13 = 1.0 or R1 = 3.0, wherever the program does not set them',
+        'as "#100" = 5.0, "#<depth>" = 2.5, Q13 = 1.0, R1 = 3.0, _DEPTH = 2.0 or VC1 = 4.0, wherever '
+        "the program does not set them",
     )
     block_delete: Literal["on", "off"] | None = Field(
         default=None,
@@ -512,7 +512,7 @@ class JobFile(Table):
     @staticmethod
     def _named(value: dict[str, float], _: Known) -> dict[str, float]:
         for name in value:
-            if not _PARAMETER.fullmatch(name):
+            if not NAMES.fullmatch(name):
                 raise refusal(f'has the key "{name}"; expected one such as "#100", "#<depth>" or "R1"')
         return value
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from cases.acceptance import TRUE_ZERO, machine
 from judge import sinumerik as judge
 
-from olp.core.errors import ProgramError
+from olp.core.errors import ConfigError, ProgramError
 from olp.core.machine import Setup
-from olp.files.config import load_setup
+from olp.files.config import load_job, load_setup
 from olp.program.registry import DIALECTS, read
 from olp.program.sinumerik.flatten.unroll import flatten
 
@@ -291,6 +293,27 @@ def test_what_is_not_run_is_refused_with_its_line(text: str) -> None:
 
 def test_values_of_the_control_come_from_the_job() -> None:
     assert unrolled("X=R9\n", parameters={"R9": 2.5}) == "X=2.5\n"
+
+
+def test_variables_of_the_control_stand_in_the_job_file(tmp_path: Path) -> None:
+    stated = {"CLEAR_X": 2.5, "GUD[0]": 1.0, "$AC_MEA[1]": 1.0, "_N": 3.0, "R1": 2.0, "VC1": 1.0}
+    job = tmp_path / "job.toml"
+    rows = "".join(f'"{name}" = {value}\n' for name, value in stated.items())
+    job.write_text(f'schema = "olp-job-1"\n[parameters]\n{rows}')
+    assert load_job(job).parameters == stated
+    text = "CLEAR_X=CLEAR_X+GUD[0]\nG1 X=CLEAR_X Y=$AC_MEA[1]+_N\n"
+    assert unrolled(text, parameters=stated) == "G1 X=3.5 Y=4\n"
+    # whether the control rounds it is not known
+    for text in ("_N=_N+0.5\n", "_M=1\n_M=0.5\n"):
+        with pytest.raises(ProgramError, match="give DEF REAL"):
+            unrolled(text, parameters=stated)
+    # short names may be axes: the job cannot state them, and no message says so
+    for name in ("X", "XA", "AX4", "SP1"):
+        job.write_text(f'schema = "olp-job-1"\n[parameters]\n"{name}" = 1.0\n')
+        with pytest.raises(ConfigError, match=f'has the key "{name}"'):
+            load_job(job)
+        with pytest.raises(ProgramError, match=f"{name} has no value that the program sets; set it"):
+            unrolled(f"Y={name}+1\n")
 
 
 @pytest.mark.parametrize("end", ("M30", "M2"))

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, MutableMapping
 from functools import lru_cache
 
 from olp.core.errors import ProgramError
+from olp.core.parameters import NAMES
 
 Value = float | bool | str
 #: Names of variables by their capitals, an index in brackets among them.
@@ -192,10 +193,9 @@ class _Reading:
         if name in _NAMED:
             return _NAMED[name]
         if name not in self.variables:
+            stated = "give it in the table [parameters] of the job file, or " if NAMES.fullmatch(name) else ""
             raise ProgramError(
-                f"{name} has no value that the program sets; give it in the table [parameters] of the job "
-                "file, or set it in the program",
-                code="OLP541",
+                f"{name} has no value that the program sets; {stated}set it in the program", code="OLP541"
             )
         return self.variables[name]
 

@@ -45,7 +45,10 @@ class Scope(MutableMapping[str, Value]):
     def is_variable(self, name: str, *, alone: bool = True) -> bool:
         """Whether an assignment to a name sets a variable; `alone`: in a block of assignments only."""
         base = name.partition("[")[0]
-        if base in self.defined or bool(_R.fullmatch(base)) or base == "R" or base in self._shared:
+        if base in self.defined or bool(_R.fullmatch(base)) or base == "R":
+            return True
+        # a name that the job states is none of a word of the control
+        if base not in _WORDS and (base in self._shared or name in self._shared):
             return True
         # a variable that is defined in the control, for all programs; beside other words it may be an axis
         return alone and bool(_GLOBAL.fullmatch(name)) and base not in _WORDS
@@ -130,16 +133,18 @@ class Scope(MutableMapping[str, Value]):
     def __setitem__(self, name: str, value: Value) -> None:
         if name in self._own:
             self._own[name] = self._kept(name, value)
-        elif _R.fullmatch(name) or name in self._shared:
-            self._shared[name] = value
         else:
-            if not isinstance(value, bool | str) and value != round(value):
+            if not (_R.fullmatch(name) or _is_integer(value) or self._is_real(name)):
                 raise ProgramError(
                     f"{name} is not defined in the program, so it may be rounded; give DEF REAL in front "
                     "of it",
                     code="OLP542",
                 )
             self._shared[name] = value
+
+    def _is_real(self, name: str) -> bool:
+        """Whether a variable of all programs has a value that an INT cannot have."""
+        return name in self._shared and not _is_integer(self._shared[name])
 
     def __delitem__(self, name: str) -> None:
         del self._own[name]
@@ -149,6 +154,10 @@ class Scope(MutableMapping[str, Value]):
 
     def __len__(self) -> int:
         return len({**self._shared, **self._own})
+
+
+def _is_integer(value: Value) -> bool:
+    return isinstance(value, bool | str) or value == round(value)
 
 
 def _split(text: str) -> list[str]:
