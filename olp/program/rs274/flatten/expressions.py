@@ -52,7 +52,8 @@ _Join = Callable[[float | None, float | None], float]
 class Arithmetic:
     """How a control evaluates expressions. `levels` are the operators of each level, the loosest first.
     `angle` is that of rise and run (ATAN[y]/[x]), `single_atan` whether ATAN takes one argument, too. With
-    `exact` EQ and NE compare exactly, and a vacant variable equals a vacant one only."""
+    `exact` EQ and NE compare exactly, and a vacant variable equals a vacant one only. `two_letters`: two
+    letters stand for a function or WHILE, as Fanuc's manual B-64304EN (16.4) has it for functions."""
 
     levels: tuple[tuple[str, ...], ...]
     operators: Mapping[str, Binary]
@@ -60,11 +61,17 @@ class Arithmetic:
     angle: Binary
     single_atan: bool
     exact: bool
+    two_letters: bool = False
 
 
 _NUMBER = pattern(r"[+-]?(?:\d+\.?\d*|\.\d+)")
 _UNSIGNED = pattern(r"\d+\.?\d*|\.\d+")
 _FUNCTION = pattern(r"(abs|acos|asin|atan|cos|exp|fix|fup|ln|round|rnd|sin|sqrt|sqr|tan|exists)(?=\[)")
+_TWO_LETTERS = pattern(r"(ab|ac|as|at|co|ex|fi|fu|ro|si|sq|ta)(?=\[)")
+_LONG = {
+    name[:2]: name
+    for name in ("abs", "acos", "asin", "atan", "cos", "exp", "fix", "fup", "round", "sin", "sqrt", "tan")
+}
 _OPERATOR = pattern(r"\*\*|\*|/|\+|-|mod|and|xor|or|eq|ne|gt|ge|lt|le")
 _COMPARISONS = ("eq", "ne", "gt", "ge", "lt", "le")
 #: levels of nesting in an expression at most
@@ -132,6 +139,10 @@ class Reader:
         if function:
             self.position = function.end()
             return self._call(function.group(1))
+        short = _TWO_LETTERS.match(text, start) if self.arithmetic.two_letters else None
+        if short:
+            self.position = short.end()
+            return self._call(_LONG[short.group(1)])
         raise ProgramError(
             f"expected a number, a parameter or [expression] at {text[start : start + 12]!r}", code="OLP540"
         )
@@ -380,6 +391,7 @@ MACRO_B = Arithmetic(
     angle=_atan2_of_positive,
     single_atan=True,
     exact=True,
+    two_letters=True,
 )
 #: Logical operators are left out: how they rank is not known.
 USER_TASKS = Arithmetic(

@@ -297,8 +297,9 @@ def _macro_b(
                 assignments.append(_assignment(reader, places, language))
             return Flow("when-then", "", None, (condition,))
         raise ProgramError("IF is followed by neither GOTO nor THEN", code="OLP510")
-    if text.startswith("while[", start):
-        reader.position += 5
+    loops = ("while[", "wh[") if reader.arithmetic.two_letters else ("while[",)
+    if text.startswith(loops, start):
+        reader.position = text.index("[", start)
         condition = reader.bracket()
         if not text.startswith("do", reader.position):
             raise ProgramError("WHILE is not followed by DO", code="OLP542")

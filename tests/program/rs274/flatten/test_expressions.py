@@ -32,6 +32,16 @@ def value(text: str, arithmetic: Arithmetic = NGC) -> float | None:
     return result
 
 
+#: Words of Macro B that their first two letters may stand for.
+LONG_WORDS = ["ABS", "ACOS", "ASIN", "ATAN", "COS", "EXP", "FIX", "FUP", "ROUND", "SIN", "SQRT", "TAN"]
+
+
+def test_two_letters_are_no_word_of_linuxcnc() -> None:
+    for word in LONG_WORDS:
+        with pytest.raises(ProgramError, match="expected a number"):
+            value(f"{word[:2]}[0.5]")
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -136,6 +146,7 @@ def test_rs274_values(text: str, expected: float) -> None:
         ("-#9", 0),
         ("[2.00009 AND 3]", 2),
         ("#[2.99991]", 11),
+        *((f"{word[:2]}[0.5]", value(f"{word}[0.5]", MACRO_B)) for word in LONG_WORDS),
     ],
 )
 def test_macro_b_values(text: str, expected: float) -> None:

@@ -361,6 +361,7 @@ def test_they_are_plain_codes_on_other_controls() -> None:
         ("IF[1EQ2]THEN#1=2 (no)\nX#1 Y2.\n", "Y2.\n"),
         ("IF[1EQ1]THEN#1=2 (yes)\nX#1\n", "(yes)\nX2.\n"),
         ("WHILE[1EQ2]DO1\nX1.\nEND1\nX2.\n", "X2.\n"),
+        ("#1=0\nWH[#1LT2]DO1\n#1=#1+1\nX[#1*CO[0]]\nEND1\n", "X1.\nX2.\n"),
         ("#1=0\nWHILE[#1LT2]DO01\n#1=#1+1\nX#1\nEND1\nX9.\n", "X1.\nX2.\nX9.\n"),
         ("#1=0\nDO2\n#1=#1+1\nX#1\nIF[#1GE2]GOTO7\nEND2\nN7 X9.\n", "X1.\nX2.\nN7 X9.\n"),
         ("#1=6\nGOTO[#1+1]\nX1.\nN7 X2.\n", "N7 X2.\n"),
