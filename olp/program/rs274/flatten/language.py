@@ -23,6 +23,7 @@ class Language:
     - `modal_variables`: #4001 to #4010 and #4107 to #4120 have what is in force before a block.
     - `work_offsets`: #5221 and on have the work offsets G54 and on, which a program in Macro B may set.
       `hole_patterns`: G70 and G71 make holes around a centre.
+    - `tool_variables`: #5400 to #5410 and #5220 have the tool in the spindle and the work offset in force.
     - `corners`: what rounds or chamfers a corner between two moves (`,r`, `,c`).
     - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
     - `splines`: G5 to G5.3 are splines, and `@` and `^` radius and angle.
@@ -42,6 +43,7 @@ class Language:
     modal_variables: bool
     work_offsets: bool = False
     hole_patterns: bool = False
+    tool_variables: bool = False
     corners: frozenset[str] = frozenset()
     saved_modes: bool
     profile_cycles: bool
@@ -58,12 +60,14 @@ class Language:
 
 
 NGC = Language(
-    arithmetic=expressions.NGC, macro_b=False, work_offsets=True, modal_variables=False, saved_modes=True,
-    profile_cycles=True, splines=True, counts_in_p=False, shared_locals=False, calls_none=True,
+    arithmetic=expressions.NGC, macro_b=False, work_offsets=True, tool_variables=True, modal_variables=False,
+    saved_modes=True, profile_cycles=True, splines=True, counts_in_p=False, shared_locals=False, calls_none=True,
     increments_open=False, decimals=12, all_digits=True, counts=frozenset(), points=False,
 )  # fmt: skip
 #: Without splines, radius and angle, cycles with a profile and saved modes, as other controls have RS-274.
-PLAIN_NGC = replace(NGC, splines=False, work_offsets=False, profile_cycles=False, saved_modes=False)
+PLAIN_NGC = replace(
+    NGC, splines=False, work_offsets=False, tool_variables=False, profile_cycles=False, saved_modes=False
+)
 MACRO_B = Language(
     arithmetic=expressions.MACRO_B, macro_b=True, work_offsets=True, modal_variables=True, saved_modes=False,
     profile_cycles=False, splines=False, counts_in_p=True, shared_locals=True, calls_none=False,

@@ -243,8 +243,7 @@ class _Flattener:
         active: list[Value] = [
             (values[i][0], tracked(line.words[i], values[i][1], self.language)) for i in kept
         ]
-        self.variables.modal.follow(active, switched=line.deleted)
-        self.variables.offsets.follow(active)
+        self.variables.follow(active, switched=line.deleted)
         before = (self.state.absolute, self.state.path, tuple(self.state.position))
         if is_pattern(active, self.state):
             self._holes(line, values, kept)

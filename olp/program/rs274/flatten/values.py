@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
@@ -11,7 +11,8 @@ from olp.program.rs274.codes import INVERSE_TIME, METRIC
 from olp.program.rs274.flatten.expressions import filled
 from olp.program.rs274.flatten.lines import Line
 from olp.program.rs274.flatten.modal_variables import ModalVariables, meaning
-from olp.program.rs274.flatten.state import ProgramState
+from olp.program.rs274.flatten.state import ProgramState, Value
+from olp.program.rs274.flatten.tool_variables import ToolVariables
 from olp.program.rs274.flatten.work_offsets import WorkOffsets
 
 #: largest local parameter of LinuxCNC
@@ -66,6 +67,7 @@ class Variables:
     ) -> None:
         self.state = state
         self.offsets = WorkOffsets(state, setup if state.profile.language.work_offsets else None)
+        self.tools = ToolVariables(state, setup if state.profile.language.tool_variables else None)
         self.modal = ModalVariables()
         self.tasks = state.profile.language.user_tasks
         names = {_bare(name, tasks=self.tasks): value for name, value in (given or {}).items()}
@@ -79,6 +81,12 @@ class Variables:
         #: those of the program itself
         self.locals: dict[int, float | None] = {i: v for i, v in self.given.items() if i <= most}
         self.names = {name: value for name, value in self.given_names.items() if not name.startswith("_")}
+
+    def follow(self, words: Sequence[Value], *, switched: bool) -> None:
+        """Take the words of a block; one that is `switched` may be left out."""
+        self.modal.follow(words, switched=switched)
+        self.offsets.follow(words)
+        self.tools.follow(words, switched=switched)
 
     def of_control(self, raw: bytes) -> bool:
         """Whether all variables of a line are the control's own, so that plain blocks have them too."""
@@ -178,7 +186,10 @@ class Variables:
     def _of_control(self, index: int) -> float | None:
         """What the job states of a variable that the control has, or of a work offset."""
         one = self._one(index)
-        return self.given[one] if one in self.given else self.offsets.value(index)
+        if one in self.given:
+            return self.given[one]
+        stated = self.offsets.value(index)
+        return self.tools.value(index) if stated is None else stated
 
     def named(self, name: str) -> float:
         known = self._predefined(name)
@@ -189,6 +200,9 @@ class Variables:
             return self._settled(name, table[name])
         if name.startswith("_") and name in self.given_names:
             return self.given_names[name]
+        stated = self.tools.named(name)
+        if stated is not None:
+            return stated
         shown = self._shown(name)
         raise ProgramError(
             f"{shown} is not set before in the program and not known off line; assign it there, or "
