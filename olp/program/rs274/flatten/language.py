@@ -61,8 +61,8 @@ class Language:
 
 NGC = Language(
     arithmetic=expressions.NGC, macro_b=False, work_offsets=True, tool_variables=True, modal_variables=False,
-    saved_modes=True, profile_cycles=True, splines=True, counts_in_p=False, shared_locals=False, calls_none=True,
-    increments_open=False, decimals=12, all_digits=True, counts=frozenset(), points=False,
+    saved_modes=True, profile_cycles=True, splines=True, counts_in_p=False, shared_locals=False,
+    calls_none=True, increments_open=False, decimals=12, all_digits=True, counts=frozenset(), points=False,
 )  # fmt: skip
 #: Without splines, radius and angle, cycles with a profile and saved modes, as other controls have RS-274.
 PLAIN_NGC = replace(
