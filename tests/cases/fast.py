@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from typing import Any, TypeVar
 
 import pytest
@@ -18,6 +18,12 @@ def some_fast(cases: Iterable[Any], each: int) -> list[Any]:
 def some_of_a_campaign(cases: Iterable[Any], each: int) -> list[Any]:
     """The cases of a slow test, all but one in `each` left to a campaign before a release."""
     return _others_marked(cases, each, pytest.mark.campaign)
+
+
+def left_to_a_campaign(cases: Iterable[Any], left: Container[Any]) -> list[Any]:
+    """The cases of a slow test, those that are in `left` left to a campaign before a release."""
+    marked = [(case, pytest.mark.campaign if case in left else ()) for case in cases]
+    return [pytest.param(*(c if isinstance(c, tuple) else (c,)), marks=marks) for c, marks in marked]
 
 
 def _others_marked(cases: Iterable[Any], each: int, mark: pytest.MarkDecorator) -> list[Any]:

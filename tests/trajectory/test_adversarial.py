@@ -12,12 +12,13 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
 import pytest
 import ruckig
+from cases.fast import left_to_a_campaign
 from cases.trajectory import CASES, LIMITS, route
 from judge.retiming import Verdict, judge
 
@@ -89,7 +90,7 @@ OWN: dict[str, Callable[[], Case]] = {
     "tiny segments, rapids": lambda: (route(beside_ten_metres(1e-9, 1e-2), np.inf, 1e-4), LIMITS),
     "all points stops": lambda: (route(flat(), 100.0, 0.0), LIMITS),
     "tiny stops": lambda: (route(flat(1e-6), 100.0, 0.0), LIMITS),
-    "stops and blends": lambda: (with_tolerances(route(flat(), 100.0, 0.0), 0.0, 0.02, 0.5), LIMITS),
+    "stops and blends": lambda: (with_tolerances(route(flat(count=20), 100.0, 0.0), 0.0, 0.02, 0.5), LIMITS),
     "fine beside coarse tolerance": lambda: (
         with_tolerances(route(flat(0.3), 100.0, 0.0), 1e-5, 5.0),
         LIMITS,
@@ -132,7 +133,7 @@ OWN: dict[str, Callable[[], Case]] = {
         route(points((0, 0, 0), (9, 0, 0), (9, 9, 0)), 1e-5, 0.01),
         LIMITS,
     ),
-    "F above all speeds": lambda: (route(flat(20.0), 1e6, 0.05), LIMITS),
+    "F above all speeds": lambda: (route(flat(20.0, 20), 1e6, 0.05), LIMITS),
     "10 m at 0.1 mm/s": lambda: (route(points((0, 0, 0), (10_000, 0, 0)), 0.1, 0.0), LIMITS),
     "spike of rapids": lambda: (
         route(np.insert(ring(3, 100), 50, [1000.0, 900, 800], axis=0), np.inf, 0.02),
@@ -148,7 +149,7 @@ OWN: dict[str, Callable[[], Case]] = {
         LIMITS,
     ),
     "corners beside stops": lambda: (with_tolerances(route(flat(0.01), 100.0, 0.0), *[0.2] * 5, 0.0), LIMITS),
-    "jerk of 10": lambda: (route(flat(5.0), 100.0, 0.05), replace(LIMITS, jerk=np.full(3, 10.0))),
+    "jerk of 10": lambda: (route(flat(5.0, 20), 100.0, 0.05), replace(LIMITS, jerk=np.full(3, 10.0))),
     "jerk of 10, tiny segments": lambda: (
         route(flat(1e-4), 100.0, 0.05),
         replace(LIMITS, jerk=np.full(3, 10.0)),
@@ -158,7 +159,7 @@ OWN: dict[str, Callable[[], Case]] = {
         route(ring(20, 2000), 200.0, 0.005),
         replace(LIMITS, jerk=np.full(3, 1e9)),
     ),
-    "acceleration of 1": lambda: (route(flat(5.0), 100.0, 0.05), faster(acceleration=2e-4)),
+    "acceleration of 1": lambda: (route(flat(5.0, 20), 100.0, 0.05), faster(acceleration=2e-4)),
     "one axis 100 times slower": lambda: (route(flat(3.0), 100.0, 0.02), SLOW_Y),
     "a circle with one axis slow": lambda: (route(ring(20, 400), 100.0, 0.01), SLOW_Y),
     "along the slow axis and across": lambda: (
@@ -168,14 +169,14 @@ OWN: dict[str, Callable[[], Case]] = {
     "ten rounds": lambda: (route(ring(2, 60, 10), 100.0, 0.01), LIMITS),
     "a closed triangle": lambda: (route(ring(10, 3, 4), np.inf, 0.2), LIMITS),
     "a helix": lambda: (
-        route(ring(5, 200, 3) + np.linspace(0, 9, 601)[:, None] * [0, 0, 1], 150.0, 0.005),
+        route(ring(5, 80, 2) + np.linspace(0, 6, 161)[:, None] * [0, 0, 1], 150.0, 0.005),
         LIMITS,
     ),
     "speed at the ceiling all along": lambda: (
         route(np.arange(200.0)[:, None] * [5.0, 0, 0], 500.0, 0.01),
         LIMITS,
     ),
-    "far from zero": lambda: (route(flat(0.5) + 1e5, 100.0, 0.01), LIMITS),
+    "far from zero": lambda: (route(flat(0.5, 20) + 1e5, 100.0, 0.01), LIMITS),
     "dwells everywhere": lambda: (
         replace(route(flat(1.0, 12), 100.0, 0.01), dwell_s=np.resize([0.0, 0.25, 1e-4, 30.0], 13)),
         LIMITS,
@@ -183,15 +184,12 @@ OWN: dict[str, Callable[[], Case]] = {
 }
 
 
-#: motions of minutes, whose speeds take long to be optimised
-LONG = ("gentle jerk", "one axis slow", "jerk of 10", "acceleration of 1")
+#: Motions of minutes, whose speeds take long to be optimised: test_optimise.py judges them too.
+LONG = ("gentle jerk", "one axis slow", "fine circle")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=[pytest.mark.slow] if name in LONG else []) for name in [*CASES, *OWN]],
-)
+@pytest.mark.parametrize("name", left_to_a_campaign((*CASES, *OWN), LONG))
 def test_every_limit_is_kept(name: str) -> None:
     held(*(CASES[name] if name in CASES else OWN[name])())
 
@@ -363,8 +361,8 @@ BROKEN = {"raises": _Raises, "refuses": _Refuses, "is slow": _Slow, "misses": _M
 ROUTES: dict[str, Callable[[], Case]] = {
     "stops": OWN["all points stops"],
     "corners": lambda: (route(flat(20.0), 150.0, 0.02), LIMITS),
+    "mixed": lambda: (with_tolerances(route(flat(count=6), 100.0, 0.0), 0.0, 0.02, 0.5), LIMITS),
     "dense": CASES["noise 0.2"],
-    "mixed": lambda: (with_tolerances(route(flat(count=14), 100.0, 0.0), 0.0, 0.02, 0.5), LIMITS),
 }
 
 
@@ -375,8 +373,11 @@ def seconds(name: str) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("how", BROKEN)
-@pytest.mark.parametrize("name", ROUTES)
+@pytest.mark.parametrize(
+    ("name", "how"),
+    # one of them of a dense route, which takes long
+    left_to_a_campaign(product(ROUTES, BROKEN), [("dense", how) for how in BROKEN if how != "misses"]),
+)
 def test_a_broken_ruckig_makes_nothing_wrong_or_much_slower(
     how: str, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
