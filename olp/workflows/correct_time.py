@@ -9,7 +9,6 @@ from olp.core.errors import OlpError
 from olp.core.progress import Progress, silent
 from olp.files.sources import Source
 from olp.workflows.flatten import UnrollOptions
-from olp.workflows.retime import RetimeOptions, durations
 from olp.workflows.session import Session
 
 #: Waypoints of a program whose speeds are optimised along dense curves.
@@ -67,6 +66,9 @@ def times(
     """Seconds of the nominal and the corrected text of a `program`, and what the correction adds as a share.
     Texts of more than `MOST_OPTIMISED` waypoints are planned without optimised speeds. Raises as `durations`.
     """
+    # a long program states no times, and needs no planner
+    from olp.workflows.retime import RetimeOptions, durations
+
     asked = RetimeOptions(
         flatten=options.flatten, expand_cycles=options.expand_cycles,
         peck_clearance_mm=options.peck_clearance_mm,
