@@ -172,6 +172,44 @@ def test_taught_points_have_their_own_base_and_tool(tmp_path: Path) -> None:
     assert b"XP2={X 8.88840,Y 2.00670,Z 2.98000,A" in done
 
 
+BEGIN = "DEF a()\nBAS(#INITMOV,0)\n{}LIN {{X 300,Y 200,Z -200,A 0,B 0,C 180}}\n{}END\n"
+
+
+@pytest.mark.parametrize(
+    ("between", "behind", "own"),
+    [
+        ("", "", {"base 0, the world,", "tool 1"}),
+        ("BAS(#TOOL,4)\n", "", {"base 0, the world,"}),
+        ("$BASE={X 100,Y 0,Z 0,A 0,B 0,C 0}\n", "", {"tool 1"}),
+        ("$BASE=$NULLFRAME\nBAS(#TOOL,1)\n", "", set()),
+        ("", "TOOL_DATA[1]={X 0,Y 0,Z 120,A 0,B 0,C 0}\n", {"base 0, the world,", "tool 1"}),
+    ],
+)
+def test_the_begin_of_a_program_sets_the_world_and_the_first_tool(
+    tmp_path: Path, between: str, behind: str, own: set[str]
+) -> None:
+    """As the control's own file says; an angle of the machine shows which tool it is."""
+    tools = {n: {"gauge_to_tip_mm": [0.0, 0.0, -lever]} for n, lever in ((1, 120.0), (4, 220.0))}
+    tools = {4: tools[4]} if behind else tools
+    recipe = Recipe(controller="kuka-krl", job_defaults={}, work_offsets={}, tools=tools)
+    path = machines.random_machine(tmp_path, 3, recipe)
+    text = BEGIN.format(between, behind).encode()
+    done = olp.correct(text, path)
+    told = {f.message.partition(" is in force here, as BAS(#INITMOV)")[0] for f in done.findings}
+    assert told & {"base 0, the world,", "tool 1"} == own
+    (x, y, z), model = krl.moves(done.data)[0].tip, JudgeModel(path)
+    place = np.array([[400.0 if "X 100" in between else 300.0, 200.0, -200.0]])
+    lever = 220.0 if "TOOL,4" in between else 120.0
+    want = model.command_for(place, np.array([0.0, 0.0, -lever]))[0]
+    assert np.abs((x, y, z) - want).max() < DIGIT
+
+
+def test_a_base_that_moves_is_not_that_of_the_begin(zero: Path) -> None:
+    text = BEGIN.format("BAS(#EX_BASE,1)\n$TOOL=$NULLFRAME\n", "")
+    with pytest.raises(ProgramError, match=r"BAS\(#EX_BASE\) in line 3 sets them"):
+        olp.correct(text.encode(), zero)
+
+
 SRC = b"DEF a()\r\n$TOOL=$NULLFRAME\r\n$BASE={X 250,Y 200,Z -300,A 0,B 0,C 0}\r\nPTP XP1\r\nEND"
 DAT = b"DEFDAT a\nDECL E6POS XP1={X 1,Y 2,Z 3,A 0,B 0,C 0,S 2}\nENDDAT"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import replace
 
 from olp.core.errors import ProgramError
@@ -53,11 +54,20 @@ class State:
     still: bool = False
 
 
-class Active:
-    """Follows the statements that set base, tool and speed."""
+#: What BAS(#INITMOV) sets, as the file bas.src of controls says: the world, and the first tool.
+_BEGIN = (Place(), Place(1))
 
-    def __init__(self, data: bytes, setup: Setup, declared: Declared, frames: RobotFrames) -> None:
+
+class Active:
+    """Follows the statements that set base, tool and speed. `told` takes a remark: what it is about, its
+    line, and its text."""
+
+    def __init__(
+        self, data: bytes, setup: Setup, declared: Declared, frames: RobotFrames,
+        told: Callable[[str, int, str], None],
+    ) -> None:  # fmt: skip
         self.data, self.setup, self.declared, self.frames = data, setup, declared, frames
+        self._told = told
         self.feed = NAN
         self._taught: Taught | None = None
         self._places: dict[tuple[str, Place], Located | Tool] = {}
@@ -160,8 +170,10 @@ class Active:
         elif command in (b"BASE", b"TOOL"):
             place = Place(int(value)) if value.isdigit() else None
             self._set(command.decode(), place, line)
-        elif command in (b"INITMOV", b"EX_BASE"):
-            self.forget(f"BAS(#{command.decode()}) in line {line.line} sets them")
+        elif command == b"INITMOV":
+            self.state, self._taught = State(*_BEGIN, ""), None
+        elif command == b"EX_BASE":
+            self.forget(f"BAS(#EX_BASE) in line {line.line} sets them")
         elif command == b"VEL_CP":
             self.feed = speed
 
@@ -198,6 +210,7 @@ class Active:
         place = state.base
         if place is None:
             place = self._stated("$BASE", state.why, line)
+        self._begun(place, "base 0, the world,", line)
         key = ("BASE", place)
         if key not in self._places:
             self._places[key] = self._located(place, line)
@@ -221,6 +234,7 @@ class Active:
         place = state.tool
         if place is None:
             place = self._stated("$TOOL", state.why, line)
+        self._begun(place, "tool 1", line)
         key = ("TOOL", place)
         if key not in self._places:
             if place.pose is not None:
@@ -233,6 +247,10 @@ class Active:
         assert isinstance(found, Tool)
         self._tools = state, found
         return found
+
+    def _begun(self, place: Place, what: str, line: int) -> None:
+        if any(place is own for own in _BEGIN):
+            self._told(f"begun: {what}", line, f"{what} is in force here, as BAS(#INITMOV) sets it")
 
     def _stated(self, what: str, why: str, line: int) -> Place:
         """What the machine file states, where no statement of the text sets it."""

@@ -81,7 +81,7 @@ class _Reader:
         self.declared = Declared(data, every)
         self.lines = [line for line in every if line.begin < end]
         self.flow = flow.Flow(self.lines)
-        self.active = Active(data, setup, self.declared, self.moves.frames)
+        self.active = Active(data, setup, self.declared, self.moves.frames, self.moves.remark)
         self.turning = Turning(self.lines)
         self.blocks: list[_Block] = []
         #: whether a routine has begun

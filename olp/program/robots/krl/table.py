@@ -37,7 +37,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"BASE_DATA[n], TOOL_DATA[n]": (
         _R, "where the text states their numbers, or `$config.dat`; else those of machine or job"
     ),
-    b"FDAT_ACT, BAS": (_R, "base and tool of a taught point"),
+    b"FDAT_ACT, BAS": (_R, "base and tool of a taught point; behind #INITMOV base 0 and tool 1"),
     b"$VEL.CP": (_R, "the speed from here on"),
     b"$ORI_TYPE=#VAR": (_R, "tools turn evenly on straight moves from here on"),
     b"$ORI_TYPE=": (_NO, "on arms, with #CONSTANT or #JOINT before a straight move; set #VAR"),
