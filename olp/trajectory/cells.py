@@ -13,8 +13,9 @@ from olp.trajectory.motion import Motion
 from olp.trajectory.passing import passing_s
 from olp.trajectory.route import AxisLimits, Route
 
-#: cells of a segment, and of the whole, at least where they are no shorter than ...
-_OF_SEGMENT = 16
+#: cells of a segment at least; a run that would have too many has fewer of each, and ...
+_OF_SEGMENT = (16, 12, 8)
+#: ... of the whole, where they are no shorter than ...
 _OF_WHOLE = 48
 #: ... this share of the time in which the jerk moves an axis by the tolerance
 _FINEST = 1.4
@@ -32,22 +33,38 @@ _FEWEST = 4
 _LEAST_S = 1e-7
 
 
-def cells_of(lasts: Array, tolerance_mm: Array, limits: AxisLimits) -> Array:
-    """(n - 1,) about the cells of segments that last so long between waypoints of tolerances (n,)."""
-    return np.ceil(np.minimum(lasts / _finest_s(tolerance_mm, limits), _OF_SEGMENT))
+def cells_of(lasts: Array, tolerance_mm: Array, limits: AxisLimits, stops: Index) -> Array:
+    """(r,) about the cells of runs from each of the `stops` to the next, whose segments last so long between
+    waypoints of tolerances (n,)."""
+    share = lasts / _finest_s(tolerance_mm, limits)
+    each = [np.add.reduceat(np.ceil(np.minimum(share, most)), stops[:-1]) for most in _OF_SEGMENT]
+    return np.select([count <= MOST_CELLS for count in each], each, each[-1])
 
 
 def knots(route: Route, limits: AxisLimits, motion: Motion) -> tuple[Array, Index]:
     """Knots (m + 1,) s, and the segment (m,) of each cell: where the motion passes waypoints, and where its
     own cubics meet, and between so many that no cell is too long. Raises CannotCompute."""
     passed = _at_once(route, passing_s(route, motion))
-    lasts = np.diff(passed)
-    most = np.minimum(lasts / _OF_SEGMENT, passed[-1] / _OF_WHOLE)
-    most = np.maximum(most, _finest_s(route.tolerance_mm, limits))
+    finest_s = _finest_s(route.tolerance_mm, limits)
+    for count in _OF_SEGMENT:
+        most = np.minimum(np.diff(passed) / count, passed[-1] / _OF_WHOLE)
+        knot_s, segment = _between(passed, np.maximum(most, finest_s), motion)
+        if len(segment) <= 2 * MOST_CELLS:
+            break
+    else:
+        raise CannotCompute("the run is too long")
+    if len(segment) < _FEWEST:
+        raise CannotCompute("the run has too few cells")
+    knot_s[0], knot_s[-1] = 0.0, float(passed[-1])
+    return np.array(knot_s), np.array(segment, np.int64)
+
+
+def _between(passed: Array, most: Array, motion: Motion) -> tuple[list[float], list[int]]:
+    """Knots and the segments of their cells, no cell of a segment longer than `most` (n - 1,) s."""
     # only cubics of time meet at knots of a spline
     own = motion.start_s if motion.cubic else passed
     knot_s, segment = [0.0], []
-    for k in np.flatnonzero(lasts > _LEAST_S).tolist():
+    for k in np.flatnonzero(np.diff(passed) > _LEAST_S).tolist():
         begin, end, gap = float(passed[k]), float(passed[k + 1]), _SAME * float(most[k])
         edges = [begin]
         for time in own[np.searchsorted(own, begin + gap) : np.searchsorted(own, end - gap)].tolist():
@@ -58,12 +75,7 @@ def knots(route: Route, limits: AxisLimits, motion: Motion) -> tuple[Array, Inde
             count = max(math.ceil((b - a) / most[k] - 1e-9), 1)
             knot_s += [a + (b - a) * i / count for i in range(1, count)] + [b]
             segment += [k] * count
-    if len(segment) > 2 * MOST_CELLS:
-        raise CannotCompute("the run is too long")
-    if len(segment) < _FEWEST:
-        raise CannotCompute("the run has too few cells")
-    knot_s[0], knot_s[-1] = 0.0, float(passed[-1])
-    return np.array(knot_s), np.array(segment, np.int64)
+    return knot_s, segment
 
 
 def halved(

@@ -145,8 +145,7 @@ def _tubed(route: Route, limits: AxisLimits, stops: Index, least_s: Array, share
     """(r,) cells of the runs that are planned in tubes: those that lose most time beside a straight move for
     each cell, as many as the `share` affords; 0 of others. `least_s` (r,): about the seconds of each run."""
     segment_s, straight_s = straight(route, limits, stops)
-    cells = cells_of(segment_s, route.tolerance_mm, limits)
-    count = np.maximum(np.add.reduceat(cells, stops[:-1]), 1.0)
+    count = np.maximum(cells_of(segment_s, route.tolerance_mm, limits, stops), 1.0)
     order = np.argsort((straight_s - least_s) / count, kind="stable")
     fits = (np.diff(stops) > 1) & (count <= MOST_CELLS)
     order = order[fits[order]]

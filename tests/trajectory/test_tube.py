@@ -11,6 +11,7 @@ from judge.retiming import judge
 
 from olp.core.errors import CannotCompute
 from olp.trajectory import descent, tube
+from olp.trajectory.cells import MOST_CELLS, knots
 from olp.trajectory.overlap import overlap
 from olp.trajectory.plan import plan
 from olp.trajectory.route import AxisLimits, Route
@@ -148,6 +149,18 @@ def test_no_more_runs_are_in_tubes_than_are_affordable() -> None:
         tolerance_mm=route.tolerance_mm[:9], dwell_s=route.dwell_s[:9],
     )  # fmt: skip
     assert all(run.tube for run in runs_of(few, LIMITS, tubes=1.0))
+
+
+@pytest.mark.parametrize(("count", "each"), [(48, 16), (50, 12), (97, 8), (98, 0)])
+def test_a_few_waypoints_more_do_not_end_a_search(count: int, each: int) -> None:
+    """A correction divides moves: its run went beyond the most cells, and was slower than the nominal one."""
+    angle = np.linspace(0.0, 2.0, count + 1)
+    route = route_of(20.0 * count * np.column_stack((np.sin(angle), np.cos(angle))), 0.01)
+    route = replace(route, line=np.arange(count))
+    (run,) = runs_of(route, LIMITS, tubes=True)
+    assert run.cells == count * each
+    segment = knots(route, LIMITS, overlap(route, LIMITS))[1]
+    assert min(each, 8) * count <= len(segment) <= 2 * MOST_CELLS
 
 
 def test_a_spline_through_cubics_of_time_is_that_motion() -> None:
