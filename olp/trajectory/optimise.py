@@ -39,6 +39,8 @@ _LAUNCH = 0.04
 _LONGEST = 0.25
 #: length of a launch over the rounding of the arc length, at least
 _DIGITS = 1e8
+#: the same where the jerk leaves the launch fewer: then it has less jerk
+_FEW_DIGITS = 1e4
 #: the same of the first cell behind it: with fewer digits its jerk would be that of rounding
 _CELL_DIGITS = 1e5
 #: share of a cell's time that the cell beside an end lasts at least
@@ -156,6 +158,10 @@ class _End:
         phase = min(a / j, float(np.sqrt(peak / j)))
         fine = j * (_LAUNCH * phase) ** 3 > _DIGITS * np.spacing(x[-1])
         seconds = (_LAUNCH if fine else _LONGEST) * phase
+        least_s = float(np.sqrt(6.0 * _FEW_DIGITS * np.spacing(x[-1]) / (_LONGEST * a)))
+        if seconds < least_s:
+            # hardly any limit of jerk: its phase is shorter than what rounding leaves of the arc length
+            seconds, j = least_s, _LONGEST * a / least_s
         gone = j * seconds**3 / 6.0
         # cells that grow in time until they are as long as all others
         times = seconds * _GROW ** np.arange(1.0, _MOST)

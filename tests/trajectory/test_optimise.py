@@ -193,6 +193,18 @@ def test_a_short_first_move_of_a_long_path_launches_within_bounds(step_mm: float
     assert fits(window.rows.rows(), window.spline, optimise._SLOWED**2 * window.start)
 
 
+def test_hardly_any_limit_of_jerk_leaves_digits_to_launch_and_land() -> None:
+    """The arc length there was rounded to nothing: far from its begin the jerk was 5.5 times its limit."""
+    limits = AxisLimits(np.full(3, 500.0), np.full(3, 2e3), np.full(3, 1e9))
+    steps = np.random.default_rng(0).normal(size=(12, 3)) * 0.08
+    steps[-1] = [150.0, 0.4, 0.0]
+    both = []
+    for some in (steps, steps[::-1]):
+        points = np.concatenate((np.zeros((1, 3)), np.cumsum(some, axis=0)))
+        both.append(lasts(route(points, 100.0, 0.005), limits))
+    assert both[0] == pytest.approx(both[1], rel=5e-3) and max(both) < 1.7
+
+
 @pytest.mark.slow
 def test_a_ramp_beside_a_turn_back_costs_no_stop() -> None:
     """The critical points stand still at such a turn, so their time says nothing of what optimising gains."""
