@@ -33,8 +33,10 @@ from olp.program.rs274.codes import (
     PATH_MODES,
     PLANE_OF,
     ROTATION,
+    SET_TOOL,
     SHIFTS,
     TILTED,
+    TOOL_CHANGE,
     TRANSFORMS,
     UNDOES,
     UNDONE_BY,
@@ -50,11 +52,6 @@ from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import NAN, PathMode
 from olp.program.rs274.turned import Along
 from olp.program.tilts import Tilt
-
-#: M6, as ten times its number.
-TOOL_CHANGE = 60
-#: M61, as ten times its number.
-SET_TOOL = 610
 
 #: L of a G10 that stores the present position.
 STORES_POSITION = 20

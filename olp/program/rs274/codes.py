@@ -121,6 +121,10 @@ LENGTHS = TABLE_LENGTHS | {LENGTH_FROM_WORDS, 432}
 WORK_OFFSETS = frozenset({540, 541, *range(550, 600, 10), 591, 592, 593})
 #: G154 P and G110 to G129.
 FURTHER_OFFSETS = frozenset({1540, *range(1100, 1300, 10)})
+#: M6, as ten times its number.
+TOOL_CHANGE = 60
+#: M61, as ten times its number.
+SET_TOOL = 610
 #: M codes that act after the motion of their block
 M_ENDS = frozenset({0, 1, 2, 30, 60})
 #: those that do so too on controls with exact stops

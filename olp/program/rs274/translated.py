@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
-from olp.program.rs274.axis_state import TOOL_CHANGE, AxisState
-from olp.program.rs274.codes import INCREMENTAL
+from olp.program.rs274.axis_state import AxisState
+from olp.program.rs274.codes import INCREMENTAL, TOOL_CHANGE
 from olp.program.rs274.flatten.language import UNROLL
 from olp.program.rs274.modes import Context
 from olp.program.rs274.offset_state import EventBlock

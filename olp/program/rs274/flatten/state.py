@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 
 from olp.core.errors import ProgramError
+from olp.core.machine import Setup
 from olp.core.units import AXES, MM_PER_INCH
 from olp.core.values import dataclass
 from olp.program.rs274.codes import (
@@ -28,9 +29,11 @@ from olp.program.rs274.codes import (
     PATH_MODES,
     PRESET,
     PROBES,
+    SET_TOOL,
     SHIFTS,
     SPLINES,
     TABLE_LENGTHS,
+    TOOL_CHANGE,
     UNITS,
     WORK_OFFSETS,
     WRITE_OFFSET,
@@ -46,7 +49,7 @@ from olp.program.rs274.cycles import (
 from olp.program.rs274.flatten.expressions import whole
 from olp.program.rs274.flatten.language import Language
 from olp.program.rs274.flatten.lines import Word
-from olp.program.rs274.profiles.base import Act
+from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.state import BROKEN_SERIES, NAN, OPEN_RETRACT, TURNED_SERIES, State
 
 #: A word with its value; None is a value whose unit is not known (`Language.increments_open`).
@@ -95,6 +98,16 @@ class ProgramState(State):
     speed: float | None = None
     saved: tuple[int | None, set[int], str] | None = None
     held_absolute: bool = True
+    #: those that M6 may move
+    tool_change_axes: tuple[int, ...] = (0, 1, 2)
+
+    @staticmethod
+    def of(profile: Profile, setup: Setup | None) -> ProgramState:
+        """The state at the start of a program; the axes that M6 may move are those of `setup`."""
+        moves = AXES if setup is None else setup.machine.tool_change_moves
+        return ProgramState(
+            profile, tool_change_axes=tuple(i for i, axis in enumerate(AXES) if axis in moves)
+        )
 
     def position_of(self, axis: int) -> float:
         """Program position of an axis; ProgramError where it is not known."""
@@ -164,11 +177,19 @@ class ProgramState(State):
             elif letter == "m" and value is not None:
                 if value in (3, 4, 5):
                     self.spindle = int(value)
-                elif value == 6 or value >= 100:
-                    self.forget()
                 elif 70 <= value <= 72 and self.profile.language.saved_modes:
                     self._keep_modes(int(value))
+                else:
+                    self._forget_moved(round(10.0 * value))
         return codes
+
+    def _forget_moved(self, code: int) -> None:
+        """The position of axes that an M code, ten times its number, may move is not known from here on."""
+        profile = self.profile
+        if code == TOOL_CHANGE:
+            self.forget(self.tool_change_axes)
+        elif code not in profile.still_m and not (profile.m61_sets_tool and code == SET_TOOL):
+            self.forget()
 
     def _after(self, codes: set[int]) -> None:
         if 400 in codes and self.compensated:

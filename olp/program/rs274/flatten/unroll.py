@@ -120,7 +120,7 @@ class _Flattener:
         parameters: Mapping[str, float] | None = None, setup: Setup | None = None, switch_open: bool = False,
     ) -> None:  # fmt: skip
         self.language, self.cycles = profile.language, profile.cycles
-        self.state = ProgramState(profile)
+        self.state = ProgramState.of(profile, setup)
         self.variables = Variables(self.state, parameters, setup)
         self.splines = Splines(self.state)
         self.strokes = strokes

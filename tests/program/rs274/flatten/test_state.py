@@ -137,8 +137,8 @@ def test_what_fanuc_reads_in_its_own_way() -> None:
         "G43 H1": {"X": 1, "Y": 2}, "G44 H1": {"X": 1, "Y": 2}, "G49": {"X": 1, "Y": 2},
         "G43 H1 Z5.": {"X": 1, "Y": 2, "Z": 5},
         "G68 X0 Y0 R30.\nG43 H1": {}, "G54 G43 H1": {}, "G43.1 Z1.": {"Z": 1},
-        # G5 is no motion, and M70 is not known
-        "G5 P1": everything, "G91\nG5 P1 X1.": {"X": 2, "Y": 2, "Z": 3}, "M70": everything,
+        # G5 is no motion, and an M code that is not known may move
+        "G5 P1": everything, "G91\nG5 P1 X1.": {"X": 2, "Y": 2, "Z": 3}, "M70": {}, "M29": everything,
         # the unit of a number without a point is open
         "X5": {"Y": 2, "Z": 3}, "X0": {"X": 0, "Y": 2, "Z": 3}, "X5.": {"X": 5, "Y": 2, "Z": 3},
         "X[5]": {"X": 5, "Y": 2, "Z": 3}, "G91 X5": {"Y": 2, "Z": 3}, "G92 X5": {"Y": 2, "Z": 3},

@@ -51,3 +51,20 @@ def test_the_interpreter_has_the_same_values(text: str, path: Path) -> None:
 def test_what_is_not_known_is_refused(text: str, path: Path) -> None:
     with pytest.raises(ProgramError, match=r"not known off line; (assign it there, or )?give it in the job"):
         olp.flatten(f"G21 G90 G54\n{text}M2\n".encode(), path)
+
+
+@pytest.mark.parametrize(
+    ("code", "axes"), [("M6", "XY"), ("T7 M6", "XY"), ("M101", "XYZ"), ("M8", "XYZ"), ("M77", "")]
+)
+def test_what_m_codes_leave_where_it_is(code: str, axes: str, tmp_path: Path) -> None:
+    """The machine file says which axes M6 may move, and which codes of the builder move none; others may."""
+    machine = machines.zero_machine(tmp_path, Recipe(tools=TOOLS, work_offsets=OFFSETS))
+    stated = 'still_m_codes = [101]\ntool_change_moves = ["Z"]\n'
+    machine.write_text(stated + machine.read_text())
+    for axis in "XYZ":
+        source = f"G21 G90 G54\nT1\nG0 X1 Y2 Z3\n{code}\nG0 X[#<_{axis}>] Y0 Z9\nM2\n".encode()
+        if axis in axes:
+            assert f"G0 X{'XYZ'.index(axis) + 1} Y0 Z9".encode() in olp.flatten(source, machine)
+        else:
+            with pytest.raises(ProgramError, match=f"the position of {axis} is needed here"):
+                olp.flatten(source, machine)
