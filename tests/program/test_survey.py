@@ -144,7 +144,10 @@ def test_a_hint_to_unroll_is_not_given_for_what_an_unrolled_program_still_has() 
     (macro,) = reasons(HEAD + b"G65 P1 X5.\nM2\nO1\nG1 X#24\nM99\n", "fanuc")[:1]
     assert macro.message == "G65 calls a macro; unroll the program with --flatten"
     (absent,) = reasons(HEAD + b"G65 P1 X5.\n", "fanuc")
-    assert absent.message.endswith("line 3: subprogram 1 is not in the file, and no file for it was given")
+    assert absent.message.endswith(
+        "line 3: subprogram 1 is not in the file, and no file for it was given; put one into the folder of "
+        "the program, such as O0001.nc"
+    )
 
 
 def test_blocks_that_break_a_rule_of_the_control_are_found_in_one_reading(
@@ -389,7 +392,8 @@ def test_hints_are_judged_with_the_files_of_subprograms() -> None:
 
     assert all("with --flatten" in hint for hint in hints(lambda name: ("7.ngc", b"o7 sub\nX1\no7 endsub\n")))
     lost = (
-        "--flatten does not unroll it: line 4: subprogram 7 is not in the file, and no file for it was given"
+        "--flatten does not unroll it: line 4: subprogram 7 is not in the file, and no file for it was "
+        "given; put one into the folder of the program, such as 7.ngc"
     )
     assert hints(None) == hints(lambda name: None) == [lost] * 2
     broken = "--flatten does not unroll it: line 2 of 7.ngc: division by zero in an expression"

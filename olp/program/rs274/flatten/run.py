@@ -197,7 +197,9 @@ class Walk(Tasks):
             given = self._subprograms(label)
             if given is None:
                 raise ProgramError(
-                    f"subprogram {label} is not in the file, and no file for it was given", code="OLP542"
+                    f"subprogram {label} is not in the file, and no file for it was given; put one into the "
+                    f"folder of the program, such as {self._file_of(label)}",
+                    code="OLP542",
                 )
             name, data = given
             self._files[label] = Unit(data, self.main.profile, name)
@@ -209,6 +211,12 @@ class Walk(Tasks):
         if start is None:
             raise ProgramError(f"the file of subprogram {label} does not define it", code="OLP542")
         return unit, start
+
+    def _file_of(self, label: str) -> str:
+        """A name of the file of a subprogram, as one may be beside the program."""
+        if self.language.user_tasks:
+            return f"{label.upper()}.SUB"
+        return f"O{label.zfill(4)}.nc" if self.language.macro_b else f"{label}.ngc"
 
     def _enter(self, frame: Frame) -> None:
         if len(self._frames) >= MAX_LEVEL:

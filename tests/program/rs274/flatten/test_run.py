@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 from cases.unrolling import fanuc, flatten, lcnc, refusal, refused
 
+MISSING = "is not in the file, and no file for it was given; put one into the folder of the program, such as"
+
 # --- IF, WHILE, DO, REPEAT of LinuxCNC ----------------------------------------------------------------------
 
 
@@ -147,13 +149,13 @@ def test_a_subprogram_is_searched_near_its_call_then_in_the_program_then_in_its_
     assert asked == ["7"]
     lost = refusal("o7 call\n", subprograms=beside)
     assert (lost.file, lost.line, lost.code, lost.message) == (
-        "7.ngc", 3, "OLP542", "subprogram 9 is not in the file, and no file for it was given"
+        "7.ngc", 3, "OLP542", f"subprogram 9 {MISSING} 9.ngc"
     )  # fmt: skip
     assert refused("o6 call\n", subprograms=beside) == (
         "OLP542", "the file of subprogram 6 does not define it", 1
     )  # fmt: skip
     assert refused("o5 call\n") == (
-        "OLP542", "subprogram 5 is not in the file, and no file for it was given", 1
+        "OLP542", f"subprogram 5 {MISSING} 5.ngc", 1
     )  # fmt: skip
 
 
@@ -263,7 +265,7 @@ def test_a_subprogram_begins_at_the_block_that_q_names(call: str, body: str) -> 
         ("M98 P2 L-1", "OLP516", "a subprogram is called -1 times; expected one or more"),
         ("M98 P2.5", "OLP540", "the program number P is 2.5; expected an integer"),
         ("M98 P2 L1.5", "OLP540", "the repeat count L is 1.5; expected an integer"),
-        ("M98 P3", "OLP542", "subprogram 3 is not in the file, and no file for it was given"),
+        ("M98 P3", "OLP542", f"subprogram 3 {MISSING} O0003.nc"),
         ("M97 P8", "OLP542", "GOTO 8: the program has no block N8"),
         ("G65", "OLP516", "G65 has no P word"),
         ("G65 P2.5", "OLP540", "the program number P is 2.5; expected an integer"),
