@@ -16,7 +16,7 @@ from olp.program.rs274.codes import CUTTER_COMPENSATION
 from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.entry import read_blocks
 from olp.program.rs274.flatten.language import MACRO_B
-from olp.program.rs274.profiles.base import ISO_M, Act, Profile
+from olp.program.rs274.profiles.base import ISO_M, M_REFUSALS, Act, Profile
 from olp.program.sinumerik.entry import asked_of, translate_text, unroll_text
 from olp.program.sinumerik.table import HARMLESS_G, ROUNDING_G, statements
 from olp.program.text.signs import SINUMERIK
@@ -79,6 +79,8 @@ DIALECT = Sinumerik(
     codes=MappingProxyType(_CODES),
     refusals=MappingProxyType({}),
     harmless_m=ISO_M | {17, *range(40, 46)},
+    # M96 and M97 are those of the machine's builder here
+    m_refusals=MappingProxyType({code: M_REFUSALS[code] for code in (980, 990)}),
     motion=1,
     initial_retract=980,
     exact_stop=True,

@@ -44,6 +44,16 @@ def program(text: str, setup: Setup) -> Program:
     return read(text.encode(), setup, SINUMERIK)
 
 
+def test_m96_is_a_code_of_the_builder(setup: Setup) -> None:
+    """It branches on other controls; here it may move axes where the machine file does not say otherwise."""
+    text = "G71 G90 G17 G54\nG0 X1 Y2 Z3\nM96\nG1 X5 F600\n"
+    assert np.isnan(program(text, setup).toolpath.end_mm[-1]).tolist() == [False, True, True]
+    still = replace(setup, machine=replace(setup.machine, still_m_codes=frozenset({96})))
+    assert end(text, still) == [5.0, 2.0, 3.0]
+    with pytest.raises(ProgramError, match="M98 calls a subprogram"):
+        program(text.replace("M96", "M98"), setup)
+
+
 def end(text: str, setup: Setup) -> list[float]:
     return [round(v, 9) for v in program(text, setup).toolpath.end_mm[-1].tolist()]
 
