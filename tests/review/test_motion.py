@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import left_to_a_campaign
 from judge.machines import zero_machine
 
 import olp
@@ -17,6 +18,8 @@ from olp.review.motion import table
 
 ROOT = Path(__file__).resolve().parents[2]
 NASTY = ROOT / "programs" / "nasty"
+#: Motions that take long to plan.
+LONG = ("cycles", "g91-steps", "helix-turns")
 PROGRAMS = ["modal", "full-circle", "g64", "g91-steps", "work-offsets", "cycles", "helix-turns", "g53-g28"]
 #: what a motion may leave the programmed path by where the program names no path tolerance
 BLEND_MM = 0.01
@@ -30,7 +33,7 @@ def viewed(name: str) -> tuple[Review, olp.Retiming]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("name", left_to_a_campaign(PROGRAMS, LONG))
 def test_at_its_time_the_motion_is_at_the_sample(name: str) -> None:
     """The re-timed motion, asked for its position at the time of a sample, is where the corrected program has
     the sample: but for rounded corners, and for what a stretch takes between two looks at it."""
@@ -93,7 +96,7 @@ def test_a_program_without_feed_has_times_all_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("name", left_to_a_campaign(PROGRAMS, LONG))
 def test_a_thinned_table_keeps_the_peaks(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     _, timing = viewed(name)
     monkeypatch.setattr(motions, "MOST_ROWS", 10**9)

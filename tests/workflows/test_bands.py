@@ -90,7 +90,7 @@ def test_a_size_of_bands_gives_the_same_of_some_that_are_shipped(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", some_of_a_campaign(range(24), 2))
+@pytest.mark.parametrize("seed", some_of_a_campaign(range(24), 6))
 def test_any_size_of_bands_gives_the_same_of_random_programs(
     seed: int, machine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

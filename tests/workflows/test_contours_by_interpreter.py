@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from judge import linuxcnc, machines
 from judge.contours import contour, entered, worn
 from judge.linuxcnc import ARC, CanonMoves
@@ -126,10 +127,11 @@ def test_holes_behind_a_contour_are_reached_as_by_the_interpreter(tmp_path: Path
                 assert mine == pytest.approx(theirs, abs=1e-6), (place, level, off)
 
 
-@pytest.mark.parametrize("form", ["contour", "path"])
-@pytest.mark.parametrize("block", range(4))
+@pytest.mark.parametrize(
+    ("block", "form"), some_of_a_campaign([(b, form) for form in ("contour", "path") for b in range(4)], 4)
+)
 def test_the_tool_goes_where_it_should_with_a_worn_cutter(tmp_path: Path, block: int, form: str) -> None:
-    """Along 100 contours: the interpreter's path of the corrected program, on the judge's machine."""
+    """Along 25 contours each: the interpreter's path of the corrected program, on the judge's machine."""
     path = machines.random_machine(tmp_path, block, WORN)
     off, taken = {}, 0
     for seed in range(25 * block, 25 * block + 25):
@@ -196,7 +198,7 @@ def test_the_tool_goes_where_it_should_along_an_arc_that_enters(tmp_path: Path, 
     assert taken >= 18
 
 
-@pytest.mark.parametrize("block", range(3))
+@pytest.mark.parametrize("block", some_of_a_campaign(range(3), 3))
 def test_short_blocks_turn_no_farther_than_the_tolerance(tmp_path: Path, block: int) -> None:
     """Blocks from 0.03 mm on, which one digit turns by 3 mrad: along the path the tool may be early."""
     path = machines.random_machine(tmp_path, block, WORN)
@@ -215,7 +217,7 @@ def test_short_blocks_turn_no_farther_than_the_tolerance(tmp_path: Path, block: 
 
 
 @pytest.mark.parametrize("play", [{}, PLAY])
-@pytest.mark.parametrize("block", range(3))
+@pytest.mark.parametrize("block", some_of_a_campaign(range(3), 3))
 def test_a_contour_that_was_taken_is_taken_once_corrected(
     tmp_path: Path, block: int, play: dict[str, float]
 ) -> None:

@@ -44,7 +44,7 @@ def directed(judge: Judge, text: bytes, control: str) -> bytes:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("control", ["fanuc", "sinumerik"])
-@pytest.mark.parametrize("chain", some_of_a_campaign(CHAINS, 2))
+@pytest.mark.parametrize("chain", some_of_a_campaign(CHAINS, 4))
 def test_directions_are_corrected_as_the_judge_finds(chain: str, control: str, tmp_path: Path) -> None:
     machine = machine_file(tmp_path, chain, control=control)
     judge = Judge(machine)
@@ -91,7 +91,7 @@ def as_blocks(text: bytes) -> bytes:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("chain", some_of_a_campaign(CHAINS[::-1], 2))
+@pytest.mark.parametrize("chain", some_of_a_campaign(CHAINS[::-1], 4))
 def test_points_with_directions_are_corrected_as_the_judge_finds(chain: str, tmp_path: Path) -> None:
     machine, job = machine_file(tmp_path, chain, control="fanuc"), tmp_path / "job.toml"
     job.write_text(STARTS["A" in chain])

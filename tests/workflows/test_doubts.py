@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from cases.fast import some_fast
+from cases.fast import some_fast, some_of_a_campaign
 from cases.joint_jobs import JOINT_JOBS
 from click.testing import CliRunner
 from judge.machines import CHAINS, Recipe, random_machine, zero_machine
@@ -468,7 +468,7 @@ def test_a_fit_states_its_quality(tmp_path: Path) -> None:
     assert read.failed() == ()
 
 
-@pytest.mark.parametrize("factor", [25.4, -1.0])
+@pytest.mark.parametrize("factor", some_of_a_campaign((25.4, -1.0), 2))
 @pytest.mark.slow
 def test_a_fit_with_a_line_in_another_unit_or_sign_is_refused(factor: float, tmp_path: Path) -> None:
     folder = tmp_path / "lines"

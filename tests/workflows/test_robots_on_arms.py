@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from judge.arm import Arm, between, quaternion, turned_by
 from judge.arm_files import MACHINE, ZEROS, arm_files
 from judge.robot_moves import PULSES_PER_DEG, READERS, Frames, abc
@@ -249,7 +250,7 @@ def steps_of(seed: int, kinds: str = "JLLPLPLJLL") -> list[Step]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("language", WRITERS)
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", some_of_a_campaign(range(2), 2))
 def test_tip_and_tool_are_where_the_program_says(language: str, seed: int, tmp_path: Path) -> None:
     """At the ends of moves and along straight ones, from both texts by a reader and an arm of their own."""
     machine, steps = stated(arm_files(tmp_path), language), steps_of(seed)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases.calibration import FRESH, TOOLS, case, cloud, line_of, residual_of
-from cases.fast import some_fast
+from cases.fast import some_fast, some_of_a_campaign
 from judge import simulated
 
 from olp.calibration.estimator.adjustment import fit
@@ -249,7 +249,7 @@ def no_square(measurements: Measurements) -> Measurements:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("chain", ["FXYZ", "YFXZ", "XYZF"])
+@pytest.mark.parametrize("chain", some_of_a_campaign(("FXYZ", "YFXZ", "XYZF"), 3))
 def test_a_ball_bar_or_diagonals_do_what_a_square_does(chain: str) -> None:
     """Lines whose straightness was read without a square; zero, centre, radius, servo mismatch and backlash
     are unknowns of the instruments."""
