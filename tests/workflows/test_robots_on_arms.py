@@ -23,6 +23,8 @@ LEVER, TOOL_DEG = np.array([10.0, -5.0, 160.0]), (0.0, 10.0, 0.0)
 TOOL = abc(*TOOL_DEG)
 FRAME_DEG, ORIGIN = (30.0, 0.0, 0.0), np.array([705.0, -94.0, 507.0])
 FRAMES = Frames(abc(*FRAME_DEG), ORIGIN)
+#: The shipped arm without errors.
+ARM = Arm(MACHINE)
 #: Last digits: mm, and rad.
 DIGITS = {
     "krl": (1e-5, 2e-8),
@@ -52,7 +54,7 @@ Step = tuple[str, np.ndarray]
 
 def local(joints: np.ndarray, digits: int = 4) -> tuple[list[float], np.ndarray]:
     """Place and rotation of the tip in the frame."""
-    rotation, place = Arm(MACHINE).pose(joints)
+    rotation, place = ARM.pose(joints)
     tip = FRAMES.turn.T @ (place + rotation @ LEVER - ORIGIN)
     return tip.round(digits).tolist(), FRAMES.turn.T @ rotation @ TOOL
 

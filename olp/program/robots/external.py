@@ -22,6 +22,8 @@ class External:
         self._errors = machine.track_errors
         self._remark = remark
         self._at: dict[int, float] = {}
+        #: what the move before states of them, so that none moves on the way to the same
+        self._before: tuple[float, ...] = ()
         self._frames: dict[tuple[str, float], Pose] = {}
 
     @property
@@ -33,7 +35,11 @@ class External:
         """Whether an axis moves on the way to a target, or may move, so that no part of that can be stated.
         One that the target does not state stays. Raises ProgramError where one is at a value at which it is
         not stated what it carries."""
-        if not self._arm or min(map(abs, target.outer), default=ABSENT) >= ABSENT:
+        if (
+            not self._arm
+            or target.outer == self._before
+            or min(map(abs, target.outer), default=ABSENT) >= ABSENT
+        ):
             return False
         before = dict(self._at)
         for number, value in enumerate(target.outer, 1):
@@ -53,6 +59,7 @@ class External:
                 self._remark(f"external {number}", line, f"{what}, as the machine file says")
             elif value != stays:
                 raise ProgramError(_unknown(number, value, self._declared), line=line, code="OLP564")
+        self._before = target.outer
         return self._at != before
 
     def frame(self, frame: Located, target: Target, line: int) -> Pose:

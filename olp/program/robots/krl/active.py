@@ -12,7 +12,7 @@ from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.robots.frames import Located, RobotFrames, Tool
 from olp.program.robots.krl.data import Declared, Taught, key_of, pose_of
-from olp.program.robots.line import Line
+from olp.program.robots.krl.text import Line
 from olp.program.robots.moves import NAN, DecidedInRun
 from olp.program.robots.poses import Pose
 

@@ -9,8 +9,7 @@ from olp.core.errors import ProgramError
 from olp.core.paired import own_end, place_of
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
-from olp.program.robots.krl.text import Aggregate, aggregate
-from olp.program.robots.line import Line
+from olp.program.robots.krl.text import SIX, Aggregate, Line, aggregate
 from olp.program.robots.moves import DecidedInRun
 from olp.program.robots.poses import Pose, of_zyx
 from olp.program.robots.targets import Span
@@ -23,11 +22,16 @@ _VALUE = pattern(rb"([\w$]+)\s*(?:\[([^\]]*)\])?\s*(?:=\s*(.*))?", re.DOTALL)
 _ASSIGNED = pattern(
     rb"([\w$]+)\s*(?:\[([^\]]*)\])?\s*((?:\.\s*[\w$]+\s*(?:\[[^\]]*\])?\s*)*)=(?!=)\s*(.*)", re.DOTALL
 )
+#: The first words of both.
+_DECLARING = frozenset(
+    (b"GLOBAL", b"DECL", b"CONST", b"INT", b"REAL", b"BOOL", b"CHAR", b"FRAME", b"POS", b"E3POS", b"E6POS",
+     b"AXIS", b"E3AXIS", b"E6AXIS", b"SIGNAL", b"STRUC", b"ENUM", b"FDAT", b"EXT", b"EXTFCT", b"IMPORT",
+     b"CHANNEL")
+)  # fmt: skip
+_SECTIONS = frozenset((b"GLOBAL", b"DEFDAT", b"ENDDAT"))
 _SECTION = pattern(rb"(?i)(?:GLOBAL\s+)?(DEFDAT|ENDDAT)\b")
 _TAUGHT = pattern(rb"(?i)\b(TOOL_NO|BASE_NO)\s+(\d+)")
 _FIXED = pattern(rb"(?i)\bIPO_FRAME\s+#TCP\b")
-#: Components of a pose.
-_POSE = frozenset("XYZABC")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +63,11 @@ def is_declaration(text: bytes) -> bool:
     return _DECLARED.match(text) is not None or _OTHER.match(text) is not None
 
 
+def declares(line: Line) -> bool:
+    """Whether a line is a declaration."""
+    return line.word in _DECLARING and is_declaration(line.text)
+
+
 def key_of(name: bytes, index: bytes | None) -> str:
     """A name with its index, in capitals and without blanks."""
     if index is not None:
@@ -82,14 +91,16 @@ class Declared:
         self._aggregates: dict[Span, Aggregate | None] = {}
         listed = False
         for line in lines:
-            section = _SECTION.match(line.text)
+            section = _SECTION.match(line.text) if line.word in _SECTIONS else None
             if section is not None:
                 listed = section[1].upper() == b"DEFDAT"
                 continue
             self._take(line, listed=listed)
 
     def _take(self, line: Line, *, listed: bool) -> None:
-        head = _DECLARED.match(line.text)
+        head = _DECLARED.match(line.text) if line.word in _DECLARING else None
+        if head is None and b"=" not in line.text:
+            return
         place = 0 if head is None else head.end()
         match = assigned(line.text) if head is None else _VALUE.fullmatch(line.text, place)
         if match is None:
@@ -167,10 +178,9 @@ class Declared:
 
 def pose_of(numbers: Aggregate, line: int, what: str = "the position") -> Pose:
     """The pose of an aggregate. Raises ProgramError where it is none."""
-    values = numbers.values
-    if not values.keys() >= _POSE:
+    if numbers.joints or not numbers.whole:
         raise ProgramError(
             f"{what} lacks one of X, Y, Z, A, B, C; state all of them", line=line, code="OLP533"
         )
-    place = values["X"][1], values["Y"][1], values["Z"][1]
-    return Pose(place, of_zyx((values["A"][1], values["B"][1], values["C"][1])))
+    x, y, z, *angles = numbers.numbers[SIX]
+    return Pose((x, y, z), of_zyx(angles))

@@ -80,8 +80,7 @@ class Krl(InPlace):
         edits = part.renumbered(target)
         if not part.turned and not (use.before == use.turn == target.turn):
             angles = zyx_of(between(use.before, use.turn, part.share))
-            for name, angle in zip("ABC", angles, strict=True):
-                a, b = numbers.values[name][0]
+            for (a, b), angle in zip(numbers.spans[3:6], angles, strict=True):
                 edits.append((a - start, b - start, f"{angle:.6f}".encode()))
         return spliced(program.data[slice(*target.value)], edits)
 

@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.robots.krl.table import STILL
-from olp.program.robots.line import Line
+from olp.program.robots.krl.text import Line
 
 _ROUTINE = pattern(rb"(?i)(?:GLOBAL\s+)?DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)\s*\(")
 _CALL = pattern(rb"(?i)(?<![#$.\w])([A-Z]\w*)\s*\(")
-_MOVES = pattern(rb"(?i)(?:S?LIN|S?PTP|S?CIRC)(?:_REL)?\b|SPLINE\b|SPL\b|ASYPTP\b")
+#: The first words of moves to positions, and of all moves.
+PATHS = frozenset((b"LIN", b"PTP", b"CIRC", b"SLIN", b"SPTP", b"SCIRC"))
+_MOVES = PATHS | {word + b"_REL" for word in PATHS} | {b"SPLINE", b"SPL", b"ASYPTP"}
 _SETS = pattern(
     rb"(?i)\$(?:BASE|TOOL|IPO_MODE)\b[^=]*=(?!=)|BAS\s*\(\s*#(?:PTP_PARAMS|CP_PARAMS|FRAMES|BASE|TOOL|INITMOV|EX_BASE)\b"
 )
 #: The first word of a statement of a block, and what it does.
-BLOCK = pattern(
+_BLOCK = pattern(
     rb"(?i)(?:(?P<routine>(?:GLOBAL\s+)?DEF(?:FCT)?)\b|(?P<data>(?:GLOBAL\s+)?DEFDAT|ENDDAT)\b|"
     rb"(?P<last>END|ENDFCT)(?![\w\[.=(])|(?P<if>IF|SWITCH)\b|"
     rb"(?P<loop>FOR|WHILE|REPEAT|LOOP)\b|(?P<else>ELSE|CASE|DEFAULT)\b|"
     rb"(?P<end>ENDIF|ENDSWITCH|ENDFOR|ENDWHILE|UNTIL|ENDLOOP)\b|(?P<label>[A-Z]\w*\s*:\s*$))"
 )
+_ROUTINES = frozenset((b"GLOBAL", b"DEF", b"DEFFCT"))
+_BLOCKS = _ROUTINES | frozenset(
+    (b"DEFDAT", b"ENDDAT", b"END", b"ENDFCT", b"IF", b"SWITCH", b"FOR", b"WHILE", b"REPEAT", b"LOOP", b"ELSE",
+     b"CASE", b"DEFAULT", b"ENDIF", b"ENDSWITCH", b"ENDFOR", b"ENDWHILE", b"UNTIL", b"ENDLOOP")
+)  # fmt: skip
 _ARGUMENT = pattern(rb"[(,]\s*([A-Za-z]\w*)\s*(?:\[[^\]]*\]\s*)?(?=[,)])")
 _STRING = pattern(rb'"[^"]*"')
 
@@ -33,19 +41,21 @@ class _Routine:
     calls: set[bytes]
 
 
-def routine_of(text: bytes) -> bytes:
+def routine_of(line: Line) -> bytes:
     """The name of a routine that a line begins, in capitals."""
-    match = _ROUTINE.match(text)
+    match = _ROUTINE.match(line.text) if line.word in _ROUTINES else None
     return b"" if match is None else match[1].upper()
 
 
-def is_move(text: bytes) -> bool:
-    return _MOVES.match(text) is not None
+def block_of(line: Line) -> re.Match[bytes] | None:
+    """What a line says of a block (`_BLOCK`); None where it says nothing."""
+    return _BLOCK.match(line.text) if line.word in _BLOCKS or line.text[-1:] == b":" else None
 
 
-def sets_frames(text: bytes) -> bool:
+def sets_frames(line: Line) -> bool:
     """Whether a statement sets base or tool, or whether the tool stands still."""
-    return _SETS.match(text) is not None
+    begins = line.text[:1] == b"$" or line.word == b"BAS"
+    return begins and _SETS.match(line.text) is not None
 
 
 def calls_in(text: bytes) -> list[bytes]:
@@ -68,17 +78,16 @@ class Flow:
         self._routines: dict[bytes, _Routine] = {}
         current: _Routine | None = None
         for line in lines:
-            text = line.text
-            name = routine_of(text)
+            name = routine_of(line)
             if name:
                 current = self._routines[name] = _Routine(moves=False, sets=False, calls=set())
             elif current is not None:
-                current.moves |= is_move(text)
-                current.sets |= sets_frames(text)
-                current.calls.update(calls_in(text))
+                current.moves |= line.word in _MOVES
+                current.sets |= sets_frames(line)
+                current.calls.update(calls_in(line.text))
         self._spread()
         #: whether any statement sets base or tool
-        self.sets = any(sets_frames(line.text) for line in lines)
+        self.sets = any(sets_frames(line) for line in lines)
         self._loops = self._setting_loops(lines)
 
     def _spread(self) -> None:
@@ -113,14 +122,12 @@ class Flow:
         found: set[int] = set()
         open_: list[tuple[int, bool]] = []
         for line in lines:
-            match = BLOCK.match(line.text)
+            match = block_of(line)
             kind = None if match is None else match.lastgroup
             if kind in ("if", "loop"):
                 open_.append((line.line, kind == "loop"))
             elif kind == "end" and open_:
                 open_.pop()
-            elif open_ and (
-                sets_frames(line.text) or any(self.may_set(name) for name in calls_in(line.text))
-            ):
+            elif open_ and (sets_frames(line) or any(self.may_set(name) for name in calls_in(line.text))):
                 found.update(begin for begin, loop in open_ if loop)
         return found

@@ -6,6 +6,8 @@ they depend on the run, a move is refused.
 
 from __future__ import annotations
 
+import re
+
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.paired import own_end
@@ -16,21 +18,17 @@ from olp.program.program import Program
 from olp.program.robots.frames import Located
 from olp.program.robots.krl import flow
 from olp.program.robots.krl.active import Active, State
-from olp.program.robots.krl.data import Declared, assigned, is_declaration, key_of, pose_of
-from olp.program.robots.krl.text import Aggregate, lines, parts
+from olp.program.robots.krl.data import Declared, assigned, declares, key_of, pose_of
+from olp.program.robots.krl.text import SIX, STATUS, TURN, Aggregate, Line, lines, parts
 from olp.program.robots.krl.turning import Turning
-from olp.program.robots.line import Line
-from olp.program.robots.moves import NAN, DecidedInRun, RobotMoves, not_read, take_all
+from olp.program.robots.krl.words import words_of
+from olp.program.robots.moves import DecidedInRun, RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose, multiplied, rotated
 from olp.program.robots.targets import ABSENT, NOWHERE, Span, Use
 
 _MOVE = pattern(rb"(?i)(S?(?:LIN|PTP|CIRC))\s*(?=[\s{])(.*)")
 _DISTANCE = pattern(rb"(?i)(S?(?:LIN|PTP|CIRC)_REL)\b")
 _OTHER_MOVE = pattern(rb"(?i)(SPLINE|SPL|ASYPTP)\b")
-_TAIL = pattern(
-    rb"(?i)\s*(\bWITH\b.*?)?(?:\s*\b(C_(?:PTP|DIS|VEL|ORI|SPL)(?:\s+C_(?:PTP|DIS|VEL|ORI))?))?\s*"
-)
-_TARGET = pattern(rb"(?i)(?:\{[^{}]*\}|[^{}])*?(?=\s*(?:\bC_(?:PTP|DIS|VEL|ORI|SPL)\b|\bWITH\b|$))")
 #: An argument of an arc, up to its comma.
 _ARGUMENT = pattern(rb"(?:\{[^{}]*\}|\[[^\]]*\]|[^{}\[\],])+")
 _ANGLE = pattern(rb"(?i)\s*CA\b.*")
@@ -44,11 +42,16 @@ _LEADS = pattern(
     rb"(?i)(?:GOTO|EXIT|RETURN|HALT|CONTINUE|WAIT|INTERRUPT|BRAKE|RESUME|ANIN|ANOUT|DIGIN|ENDSPLINE|"
     rb"ON_ERROR_PROCEED)\b"
 )
-#: Components of a position, and its external axes.
-_PLACE = ("X", "Y", "Z")
-_POSE = (*_PLACE, "A", "B", "C")
-_JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
-_OUTER = ("E1", "E2", "E3", "E4", "E5", "E6")
+
+
+@dataclass(frozen=True, slots=True)
+class _Stated:
+    """A position: its numbers, the `line` that states them, and its name with its index; None where they
+    stand in the move."""
+
+    line: Line
+    numbers: Aggregate
+    name: re.Match[bytes] | None
 
 
 @dataclass(slots=True)
@@ -97,9 +100,7 @@ class _Reader:
         take_all(self.lines, self._statement, self.moves, self.refusals, options)
         self.moves.hold(self.active.named)
         self._taken()
-        self.moves.hold_mentioned(
-            (line.begin, line.end) for line in self.lines if not is_declaration(line.text)
-        )
+        self.moves.hold_mentioned((line.begin, line.end) for line in self.lines if not declares(line))
         return self.moves.program(dialect, words=words)
 
     def _taken(self) -> None:
@@ -111,7 +112,7 @@ class _Reader:
     def _mentioned(self, line: Line) -> None:
         """A routine may give its arguments other values."""
         for name in flow.calls_in(line.text):
-            if name == b"BAS" or flow.routine_of(line.text) or is_declaration(line.text):
+            if name == b"BAS" or flow.routine_of(line) or declares(line):
                 continue
             for argument in flow.arguments_in(line.text):
                 self.declared.change(argument, line.line)
@@ -120,15 +121,15 @@ class _Reader:
 
     def _statement(self, line: Line) -> None:
         text = line.text
-        block = flow.BLOCK.match(text)
+        block = flow.block_of(line)
         if block is not None:
             self.turning.forget()
             self._block(block.lastgroup or "", line)
             return
-        if self.listed or is_declaration(text):
+        if self.listed or declares(line):
             return
         self.turning.take(line)
-        move = _MOVE.fullmatch(text)
+        move = _MOVE.fullmatch(text) if line.word in flow.PATHS else None
         if move is not None:
             try:
                 self._move(line, move[1].upper(), line.begin + move.start(2))
@@ -193,7 +194,7 @@ class _Reader:
 
     def _module(self, line: Line) -> None:
         """Raises ProgramError where a list of data is that of another module."""
-        names = (flow.routine_of(every.text) for every in self.lines)
+        names = (flow.routine_of(every) for every in self.lines)
         data, own = _DATA_OF.match(line.text), next((name for name in names if name), b"")
         if data is not None and own and data[1].upper() != own:
             raise ProgramError(
@@ -223,31 +224,28 @@ class _Reader:
     # -- moves ---------------------------------------------------------------------------------------
 
     def _move(self, line: Line, word: bytes, begin: int) -> None:
-        stated = _TARGET.match(self.data, begin, line.end)
-        tail = None if stated is None else _TAIL.fullmatch(self.data, stated.end(), line.end)
-        if stated is None or tail is None or not stated[0].strip():
-            raise ProgramError("the words of this move are not read", line=line.line, code="OLP516")
-        target = stated.start() + len(stated[0]) - len(stated[0].lstrip()), stated.end()
-        if _ACTUAL.fullmatch(stated[0].strip()):
+        words = words_of(self.data, begin, line)
+        target, terms = words.target, words.terms
+        if _ACTUAL.fullmatch(self.data, *target):
             return
-        if any(block.loop and block.moves == self.moves.count for block in self.blocks):
+        if self.blocks and any(block.loop and block.moves == self.moves.count for block in self.blocks):
             # the first move in a loop begins where the last one ends, or before the loop
             self.moves.known = False
-        arc = word.endswith(b"CIRC")
+        arc, state = word.endswith(b"CIRC"), self.active.state
+        within = self.data[slice(*words.within)] if words.within != NOWHERE else b""
         if self.moves.arm and (arc or word.endswith(b"LIN")):
-            self.turning.check(tail[1] or b"", line)
-        state = self.active.state
-        if tail[1] is not None:
-            state = self.active.within(tail[1], tail.start(1), line)
+            self.turning.check(within, line)
+        if words.within != NOWHERE:
+            state = self.active.within(within, words.within[0], line)
         if arc:
-            self._arc(line, target, state, tail.span(2), by_via=word == b"SCIRC")
+            self._arc(line, target, state, words.zone, by_via=word == b"SCIRC")
             return
-        terms = parts(self.data, target)
-        if self._in_joints(terms, line):
-            self.moves.joint_move(line.line, lambda: self._joints(terms[0], tail.span(2), line))
+        stated = self._stated(terms[0], line) if len(terms) == 1 else None
+        if self._at_home(terms) if stated is None else stated.numbers.joints:
+            self.moves.joint_move(line.line, lambda: self._joints(terms[0], stated, words.zone, line))
             return
         base = self.active.base(state, line.line)
-        use, frame = self._use(line, target, terms, base, tail.span(2))
+        use, frame = self._use(line, target, terms, stated, base, words.zone)
         tool = self.active.tool(state, line.line)
         self.moves.move(
             line.line, use, frame, tool, self.active.feed, straight=word.endswith(b"LIN"),
@@ -271,7 +269,7 @@ class _Reader:
         for match in stated:
             begin = match.start() + len(match[0]) - len(match[0].lstrip())
             own = begin, begin + len(match[0].strip())
-            uses.append(self._use(line, own, parts(self.data, own), base, zone))
+            uses.append(self._use(line, own, parts(self.data, own), None, base, zone))
         (via, frame), (end, other) = uses
         if frame.name != other.name:
             raise not_read("via point and end of this arc are in different frames", line.line)
@@ -280,59 +278,53 @@ class _Reader:
             line.line, via, end, frame, tool, self.active.feed, whole=self.triggered, turned_by_via=by_via
         )
 
-    def _in_joints(self, terms: list[Span], line: Line) -> bool:
-        """Whether a move states joints, as those of the home position do, which the control knows."""
-        if len(terms) != 1:
-            return False
-        text = self.data[slice(*terms[0])]
-        numbers = self.declared.aggregate(terms[0])
-        if numbers is None:
-            name = _NAME.fullmatch(text)
-            if name is None:
-                return False
-            key = key_of(name[1], name[2])
-            if key not in self.declared.values:
-                return _HOME.fullmatch(key.encode("latin-1")) is not None
-            numbers = self._position(name[1], name[2], line)[1]
-        return numbers.joints
-
-    def _joints(self, span: Span, zone: Span, line: Line) -> Use | None:
-        """How a move uses joint values; None where the text does not state all six."""
-        numbers, declaration, name = self.declared.aggregate(span), line, None
-        if numbers is None:
-            name = _NAME.fullmatch(self.data, *span)
-            assert name is not None
-            if key_of(name[1], name[2]) not in self.declared.values:
-                return None
-            declaration, numbers = self._position(name[1], name[2], line)
-        if not set(_JOINTS) <= set(numbers.values):
+    def _stated(self, span: Span, line: Line) -> _Stated | None:
+        """The position that a term is; None where the text states none. Raises ProgramError where its numbers
+        depend on the run."""
+        numbers = self.declared.aggregate(span)
+        if numbers is not None:
+            return _Stated(line, numbers, None)
+        name = _NAME.fullmatch(self.data, *span)
+        if name is None or key_of(name[1], name[2]) not in self.declared.values:
             return None
+        return _Stated(*self._position(name[1], name[2], line), name)
+
+    def _at_home(self, terms: list[Span]) -> bool:
+        """Whether a move goes to the home position, whose joints the control knows."""
+        name = _NAME.fullmatch(self.data, *terms[0]) if len(terms) == 1 else None
+        return name is not None and _HOME.fullmatch(key_of(name[1], name[2]).encode("latin-1")) is not None
+
+    def _joints(self, span: Span, stated: _Stated | None, zone: Span, line: Line) -> Use | None:
+        """How a move uses joint values; None where the text does not state all six."""
+        if stated is None or not stated.numbers.whole:
+            return None
+        numbers, name = stated.numbers, stated.name
         if numbers.span not in self.targets:
-            values = [numbers.values[axis] for axis in _JOINTS]
-            a, b, c, d, e, f = (value for _, value in values)
+            a, b, c, d, e, f = numbers.numbers[SIX]
             self.targets[numbers.span] = self.moves.joint_target(
-                declaration.line, numbers.span, [own for own, _ in values], (a, b, c, d, e, f),
-                _outer(numbers, ABSENT), "" if name is None else name[1].decode("latin-1"),
-                NOWHERE if name is None else (declaration.begin, declaration.end),
+                stated.line.line, numbers.span, numbers.spans[SIX], (a, b, c, d, e, f),
+                numbers.outer(ABSENT), "" if name is None else name[1].decode("latin-1"),
+                NOWHERE if name is None else (stated.line.begin, stated.line.end),
             )  # fmt: skip
         named = NOWHERE if name is None else span
         return Use(self.targets[numbers.span], (line.begin, line.end), span, named, zone=zone)
 
     def _use(
-        self, line: Line, span: Span, terms: list[Span], base: Located, zone: Span
+        self, line: Line, span: Span, terms: list[Span], stated: _Stated | None, base: Located, zone: Span
     ) -> tuple[Use, Located]:
         """How a move uses its target, and the frame that this is in. In a product the last term with a name
-        is the target; numbers behind it are a shift in it."""
+        is the target; numbers behind it are a shift in it. A single term is `stated`, where the text states
+        it."""
         statement = (line.begin, line.end)
         last = self.declared.aggregate(terms[-1]) if len(terms) > 1 else None
         shift = Pose() if last is None else pose_of(last, line.line)
         own = terms[-1] if last is None else terms[-2]
         frame = self._frame(base, terms[: terms.index(own)], line)
-        index, named = self._target(own, line)
+        index, named = self._target(own, stated or self._known(own, line), line)
         turn, place = self.moves.targets[index].turn, (own[0], span[1])
         if last is None:
             return Use(index, statement, place, named, turn=turn, zone=zone), frame
-        x, y, z = (last.values[name][0] for name in _PLACE)
+        x, y, z = last.spans[:3]
         use = Use(
             index, statement, place, named, rotated(turn, shift.origin_mm), multiplied(turn, shift.turn),
             zone=zone, offsets=(x, y, z), offset_turn=turn, along_tool=True,
@@ -381,25 +373,29 @@ class _Reader:
             )
         return found[0].line, found[1]
 
-    def _target(self, span: Span, line: Line) -> tuple[int, Span]:
-        """The place of a target, and the bytes of its name, `NOWHERE` where it is stated in the move."""
-        numbers, declaration = self.declared.aggregate(span), line
+    def _known(self, span: Span, line: Line) -> _Stated:
+        """The position that a term is. Raises ProgramError where the text does not state it."""
+        stated = self._stated(span, line)
+        if stated is not None:
+            return stated
         name = _NAME.fullmatch(self.data, *span)
-        if numbers is None and name is not None:
-            declaration, numbers = self._position(name[1], name[2], line)
-        if numbers is None:
+        if name is None:
             raise self._computed(span, line)
+        return _Stated(*self._position(name[1], name[2], line), name)
+
+    def _target(self, span: Span, stated: _Stated, line: Line) -> tuple[int, Span]:
+        """The place of a target, and the bytes of its name, `NOWHERE` where it is stated in the move."""
+        numbers, name = stated.numbers, stated.name
         if numbers.span not in self.targets:
             what = "the position" if name is None else f"the position {key_of(name[1], name[2])}"
-            pose, values = pose_of(numbers, line.line, what), numbers.values
-            x, y, z, a, b, c = [values[axis][0] for axis in _POSE]
+            pose = pose_of(numbers, line.line, what)
+            x, y, z, a, b, c, _, turn, along, *_ = numbers.spans
             self.targets[numbers.span] = self.moves.target(
-                declaration.line, numbers.span, (x, y, z), pose.origin_mm, pose.turn, _outer(numbers, 0.0),
+                stated.line.line, numbers.span, (x, y, z), pose.origin_mm, pose.turn, numbers.outer(0.0),
                 "" if name is None else name[1].decode("latin-1"),
-                NOWHERE if name is None else (declaration.begin, declaration.end), (a, b, c),
-                (values["T"][0],) if "T" in values else (),
-                (values["S"][1] if "S" in values else NAN, values["T"][1] if "T" in values else NAN),
-                _outer(numbers, ABSENT), along=values[_OUTER[0]][0] if _OUTER[0] in values else NOWHERE,
+                NOWHERE if name is None else (stated.line.begin, stated.line.end), (a, b, c),
+                () if turn == NOWHERE else (turn,), numbers.numbers[STATUS : TURN + 1],
+                numbers.outer(ABSENT), along=along,
             )  # fmt: skip
         return self.targets[numbers.span], NOWHERE if name is None else span
 
@@ -410,11 +406,3 @@ class _Reader:
             line=line.line,
             code="OLP533",
         )
-
-
-def _outer(numbers: Aggregate, absent: float) -> tuple[float, ...]:
-    """The values of the external axes; `absent` is that of one which is not stated, and stays."""
-    values = numbers.values
-    if values.keys().isdisjoint(_OUTER):
-        return (absent,) * len(_OUTER)
-    return tuple([values[axis][1] if axis in values else absent for axis in _OUTER])

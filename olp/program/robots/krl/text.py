@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import isnan
 
 from olp.core.patterns import pattern
 from olp.core.spool import Text
 from olp.core.values import dataclass
-from olp.program.robots.line import Line
-from olp.program.robots.targets import Span
+from olp.program.robots import line
+from olp.program.robots.targets import NOWHERE, Span
 from olp.program.text.line_ends import split
 from olp.program.text.numbers import LARGEST
 
@@ -18,28 +19,53 @@ _COMPONENT = pattern(
     rb"(?i)\s*([A-Z]\w*)(?:\s+|(?=[-+.']))"
     rb"([-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?|'[BH][\dA-F]+')\s*(?:,|$)"
 )
-#: A position in the usual form, as taught points have it: its components in their order.
-_ORDER = ("X", "Y", "Z", "A", "B", "C", "S", "T", "E1", "E2", "E3", "E4", "E5", "E6")
+#: Components of positions in their order, and those of joints.
+_OF_POSES = ("X", "Y", "Z", "A", "B", "C", "S", "T", "E1", "E2", "E3", "E4", "E5", "E6")
+_OF_JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6", "", "", *_OF_POSES[8:])
+#: The places of six joints, or of a place and its angles; of status and turn; of external axes.
+SIX, STATUS, TURN, OUTER = slice(6), 6, 7, slice(8, 14)
+#: A position in the usual form, as taught points have it.
 _N = rb"([-+]?(?:\d+\.?\d*|\.\d+))"
 _USUAL = pattern(
     rb"\{\s*(?:(?:FRAME|POS|E3POS|E6POS)\s*:\s*)?"
-    + rb"\s*,\s*".join(name.encode() + rb"\s+" + _N for name in _ORDER[:6])
-    + b"".join(rb"(?:\s*,\s*" + name.encode() + rb"\s+" + _N + rb")?" for name in _ORDER[6:])
+    + rb"\s*,\s*".join(name.encode() + rb"\s+" + _N for name in _OF_POSES[:6])
+    + b"".join(rb"(?:\s*,\s*" + name.encode() + rb"\s+" + _N + rb")?" for name in _OF_POSES[6:])
     + rb"\s*\}"
 )
 _PART = pattern(rb"\{[^{}]*\}|[^{}:]+")
+_WORD = pattern(rb"\w*")
+#: Stands for a component that is not stated.
+_UNSTATED = b"nan"
+NAN = float(_UNSTATED)
 #: Bases of bit strings by their letters.
 _BASES = {"B": 2, "H": 16}
 
 
 @dataclass(frozen=True, slots=True)
+class Line(line.Line):
+    """A line with its first `word` in capitals, empty where it begins with something else."""
+
+    word: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class Aggregate:
-    """An aggregate of numbers: its bytes, the bytes and the value of each component by its name in capitals,
-    and whether these are joints."""
+    """An aggregate of numbers: its bytes, (14,) the bytes and the value of each component, and whether these
+    are joints. What is not stated is `NOWHERE` and NaN."""
 
     span: Span
-    values: dict[str, tuple[Span, float]]
+    spans: tuple[Span, ...]
+    numbers: tuple[float, ...]
     joints: bool
+
+    @property
+    def whole(self) -> bool:
+        """Whether all six joints are stated, or a place with its angles."""
+        return NOWHERE not in self.spans[SIX]
+
+    def outer(self, absent: float) -> tuple[float, ...]:
+        """The values of the external axes; `absent` is that of one which is not stated, and stays."""
+        return tuple([absent if isnan(value) else value for value in self.numbers[OUTER]])
 
 
 def lines(data: bytes) -> Iterator[Line]:
@@ -53,28 +79,27 @@ def lines(data: bytes) -> Iterator[Line]:
             code = match[0]
         rest = code.lstrip()
         if rest and rest[:1] != b"&":
-            yield Line(number, place + len(code) - len(rest), rest.rstrip())
+            word = _WORD.match(rest)
+            assert word is not None
+            yield Line(number, place + len(code) - len(rest), rest.rstrip(), word[0].upper())
         place += len(raw)
 
 
 def aggregate(data: Text, span: Span) -> Aggregate | None:
     """The aggregate that bytes are; None where they are none, or one of its components is no number."""
-    values: dict[str, tuple[Span, float]] = {}
     if data[span[0] : span[0] + 1] != b"{":
         return None
-    match = _USUAL.fullmatch(data, *span)
-    if match is not None:
-        whole, *spans = match.regs
-        values = {
-            name: (own, float(text))
-            for name, own, text in zip(_ORDER, spans, match.groups(), strict=True)
-            if text is not None
-        }
-        large = any(not -LARGEST < value < LARGEST for _, value in values.values())
-        return None if large else Aggregate(whole, values, joints=False)
+    usual = _USUAL.fullmatch(data, *span)
+    if usual is not None:
+        numbers = tuple(map(float, usual.groups(_UNSTATED)))
+        # the first one is stated, and none is more or less than NaN
+        if max(numbers) >= LARGEST or min(numbers) <= -LARGEST:
+            return None
+        return Aggregate(usual.regs[0], usual.regs[1:], numbers, joints=False)
     match = _AGGREGATE.fullmatch(data, *span)
     if match is None:
         return None
+    values: dict[str, tuple[Span, float]] = {}
     place, end = match.span(2)
     for component in _COMPONENT.finditer(data, place, end):
         if component.start() != place:
@@ -87,8 +112,9 @@ def aggregate(data: Text, span: Span) -> Aggregate | None:
         place = component.end()
     if place < end:
         return None
-    kind = (match[1] or b"").upper()
-    return Aggregate(match.span(), values, kind.endswith(b"AXIS") or "A1" in values)
+    joints = (match[1] or b"").upper().endswith(b"AXIS") or "A1" in values
+    stated = [values.get(name, (NOWHERE, NAN)) for name in (_OF_JOINTS if joints else _OF_POSES)]
+    return Aggregate(match.span(), tuple(own for own, _ in stated), tuple(v for _, v in stated), joints)
 
 
 def parts(data: bytes, span: Span) -> list[Span]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from olp.core.patterns import pattern
-from olp.program.robots.line import Line
+from olp.program.robots.krl.text import Line
 from olp.program.robots.moves import not_read
 
 _SET = pattern(rb"(?i)\$ORI_TYPE\s*=(?!=)\s*(.*)")
@@ -14,8 +14,6 @@ _OF_TAUGHT = pattern(rb"(?i)SORI_TYP\s*\(\s*(\w+)\s*\)\s*")
 _TAUGHT = pattern(rb"(?i)(\w+)\s*=\s*\{[^{}]*\bORI_TYP\s*#(\w+)")
 _ACTIVE = pattern(rb"(?i)LDAT_ACT\s*=\s*(\w+)")
 _BAS = pattern(rb"(?i)BAS\s*\(\s*#(INITMOV|CP_PARAMS)\b")
-#: How statements begin that any of these say.
-_ANY = pattern(rb"(?i)\$ORI_TYPE|LDAT_ACT|BAS\b")
 _EVEN = "#VAR"
 #: Arcs along which the tool turns with the path.
 _ALONG = pattern(rb"(?i)\$CIRC_TYPE\s*=(?!=)\s*(?!#BASE\b|SCIRC_TYP)|\bCIRC_TYP\s+#(?!BASE\b)")
@@ -51,7 +49,8 @@ class Turning:
     def take(self, line: Line) -> None:
         """Follow a statement."""
         self._begun = True
-        if _ANY.match(line.text) is None:
+        # most lines are positions and moves
+        if line.text[:1] != b"$" and line.word not in (b"BAS", b"LDAT_ACT"):
             return
         stated, active, call = (form.match(line.text) for form in (_SET, _ACTIVE, _BAS))
         if stated is not None:
