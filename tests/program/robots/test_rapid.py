@@ -192,6 +192,15 @@ def test_behind_moves_that_may_not_run_only_the_end_is_corrected(bent: Path) -> 
     assert not lines[second + 5].startswith("MoveL [[-60.0"), "the last move is split"
 
 
+@pytest.mark.parametrize("handler", ["ERROR", "ERROR (ERR_A, ERR_B)", "ERROR(ERR_A)"])
+def test_the_handler_of_errors_begins_anywhere(bent: Path, handler: str) -> None:
+    move = f"MoveL [[%s60,60,20],{TAIL},v100,fine,grip\\WObj:=part;\n"
+    body = f"PROC main()\n{move % ''}{handler}\n{move % '-'}RETRY;\nENDPROC\nENDMODULE\n"
+    text = olp.correct(HEAD.encode() + body.encode(), bent).data.decode()
+    assert text.count("MoveL") == 2, "the move of the handler is not split"
+    assert handler in text.splitlines()
+
+
 #: moves as plain ones, and as those of a process or a signal: same numbers, and data that stay
 PROCESSES = [
     (r"MoveL (.*?), v100,z10,(.*?);", r"ArcL \1, v100,seam1,weld1\\Weave:=wv1,z10,\2;"),

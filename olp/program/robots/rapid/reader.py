@@ -192,7 +192,7 @@ class _Reader:
         elif block in ("if", "loop", "test"):
             self.blocks.append((block == "loop", self.moves.count))
         elif block in ("elseif", "case", "part"):
-            if statement.text.upper().split()[0] in (b"ERROR", b"UNDO", b"BACKWARD"):
+            if statement.text.upper().partition(b"(")[0].strip() in (b"ERROR", b"UNDO", b"BACKWARD"):
                 self.blocks = []
                 self._unknown()
             elif self.blocks and self.blocks[-1][1] != self.moves.count:

@@ -21,7 +21,7 @@ _BLOCK = pattern(
     rb"(?i)(?:(?P<routine>(?:LOCAL\s+|TASK\s+)?(?:PROC|FUNC|TRAP|RECORD)\b)[^\r\n!;]*|"
     rb"(?P<module>MODULE\s+\w+(?:\s*\([^)]*\))?)|"
     rb"(?P<end>END(?:MODULE|PROC|FUNC|TRAP|RECORD|IF|FOR|WHILE|TEST)\b)|"
-    rb"(?P<part>(?:ERROR|UNDO|BACKWARD|ELSE|DEFAULT\s*:)(?![\w:]))|"
+    rb"(?P<part>ERROR\s*\([^;!()]*\)|(?:ERROR|UNDO|BACKWARD|ELSE|DEFAULT\s*:)(?![\w:]))|"
     rb"(?P<elseif>ELSEIF\b(?:[^;!\"]|\"[^\"\r\n]*\")*?\bTHEN\b)|"
     rb"(?P<case>CASE\b(?:[^;!\"]|\"[^\"\r\n]*\")*?:(?!=))|"
     rb"(?P<if>IF\b(?:[^;!\"]|\"[^\"\r\n]*\")*?\bTHEN\b)|"
