@@ -139,7 +139,7 @@ def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:
                 [m.line for m in wide],
             )
         )
-    merging = [m.line for m in program.path_modes if m.merges and (m.tolerance_mm or 0) > 0]
+    merging = [m.line for m in program.path_modes if m.merge_mm > 0.0 and (m.tolerance_mm or 0) > 0]
     if merging:
         findings.append(
             finding("OLP203", "G64 P without Q0 also merges short blocks within the tolerance", merging)

@@ -20,7 +20,8 @@ CORNER = ["G64 P0.01", "G1 X40 F3000", "G1 Y40"]
 def stretch(rows: list[str], control: Control) -> Moves:
     program = reading("\n".join(["G21 G90 G17", *rows, "M2", ""]), "linuxcnc")
     chord = control.values({})[control.chord_mm] if control.chord_mm else None
-    (part,) = moves(program, blend_mm=np.inf, chord_mm=chord)
+    said = None if control.said is None else control.said(program)
+    (part,) = moves(program, blend_mm=np.inf, chord_mm=chord, said=said)
     return part
 
 
@@ -53,6 +54,25 @@ def test_a_corner_on_linuxcnc_by_hand() -> None:
         by_hand += (2 * 50.0 - begin - end) / change + (40.0 - radius - up - down) / 50.0
     control = CONTROLS["linuxcnc"]
     assert total(stretch(CORNER, control), control) == pytest.approx(by_hand, rel=1e-6)
+
+
+def test_linuxcnc_drives_nearly_straight_moves_as_one() -> None:
+    """Within Q of G64, or P without it, at one feed. A step of 1 um takes no time then."""
+    control = CONTROLS["linuxcnc"]
+    ends = ["G1 X10 F3000", "G1 X10 Y0.001", "G1 X30 Y0.001", "G1 X40 Y0"]
+    line = total(stretch(["G64 P0.01", "G1 X40 F3000"], control), control)
+    part = stretch(["G64 P0.01", *ends], control)
+    each = move_seconds(control, part, LIMITS, control.values({}))
+    assert each.sum() == pytest.approx(line, rel=1e-9) and not each[:-1].any()
+    for mode in ("G64 P0.01 Q0", "G64 P0.01 Q0.0005", "G64"):
+        assert total(stretch([mode, *ends], control), control) > 1.02 * line
+    slower = stretch(["G64 P0.01", *ends[:2], "F2900", *ends[2:]], control)
+    assert (move_seconds(control, slower, LIMITS, control.values({})) > 0.0).tolist() == [
+        False,
+        True,
+        False,
+        True,
+    ]
 
 
 def test_grbl_can_stop_within_its_buffer() -> None:

@@ -18,6 +18,7 @@ from olp.trajectory.controls.base import AxisSpeeds, move_seconds
 from olp.trajectory.controls.learning import learned
 from olp.trajectory.controls.linuxcnc import CONTROL
 from olp.trajectory.controls.moves import moves
+from olp.trajectory.controls.naive import said
 
 pytestmark = [pytest.mark.oracle, pytest.mark.slow]
 
@@ -69,6 +70,12 @@ def dense() -> list[str]:
     return ["G64 P0.01 Q0", *(f"G1 X{x:.3f} Y{y:.3f} F12000" for x, y in points)]
 
 
+def jogs(mode: str) -> list[str]:
+    """A line of 100 mm with steps of 1 um, which the control merges within a tolerance."""
+    ends = [(x, y) for k in range(10) for x, y in ((10 * k + 10, k % 2), (10 * k + 10, 1 - k % 2))]
+    return [mode, *(f"G1 X{x} Y{0.001 * y:.3f} F6000" for x, y in ends)]
+
+
 PROGRAMS: dict[str, Callable[[], list[str]]] = {
     "square, 10 um": lambda: square("G64 P0.01 Q0"),
     "square, no tolerance": lambda: square("G64 Q0"),
@@ -78,6 +85,9 @@ PROGRAMS: dict[str, Callable[[], list[str]]] = {
     "walk, 0.1 mm": lambda: walk(2, 0.1),
     "arcs": lambda: arcs(3),
     "dense": dense,
+    "jogs, merged": lambda: jogs("G64 P0.01"),
+    "jogs, 0.2 um": lambda: jogs("G64 P0.01 Q0.0002"),
+    "dense, merged": lambda: ["G64 P0.02", *dense()[1:]],
 }
 
 
@@ -88,8 +98,8 @@ def test_the_time_of_linuxcnc_is_predicted_within_two_percent(
     controller.require()
     text = "\n".join(["G21 G90 G17", *PROGRAMS[name](), "M2", ""]).encode()
     described = machine(tmp_path / "machine", tables=TRUE_ZERO, job=START)
-    (part,) = moves(read(text, load_setup(described, described.with_name("job.toml")), DIALECTS["linuxcnc"]),
-                    blend_mm=np.inf)  # fmt: skip
+    program = read(text, load_setup(described, described.with_name("job.toml")), DIALECTS["linuxcnc"])
+    (part,) = moves(program, blend_mm=np.inf, said=said(program))
     # the largest speed along the path is a key of its own there
     part = replace(part, feed_mm_s=np.minimum(part.feed_mm_s, controller.SPEED_MM_S))
     run = controller.run(text, described, tmp_path / "control")
@@ -110,8 +120,8 @@ def test_limits_are_learned_from_a_log(tmp_path: Path) -> None:
     ]
     text = "\n".join(["G21 G90 G17", *rows, "M2", ""]).encode()
     described = machine(tmp_path / "machine", tables=TRUE_ZERO, job=START)
-    parts = moves(read(text, load_setup(described, described.with_name("job.toml")), DIALECTS["linuxcnc"]),
-                  blend_mm=np.inf)  # fmt: skip
+    program = read(text, load_setup(described, described.with_name("job.toml")), DIALECTS["linuxcnc"])
+    parts = moves(program, blend_mm=np.inf, said=said(program))
     run = controller.run(text, described, tmp_path / "control")
     slower = AxisSpeeds(0.5 * LIMITS.velocity, 0.3 * LIMITS.acceleration, LIMITS.jerk)
     time_s = np.arange(len(run.axis)) * TICK_S

@@ -510,14 +510,15 @@ class AxisState(OffsetState):
 
     def _path_mode(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         name = f"G{code / 10:g}"
-        tolerance, merges = None, False
+        tolerance, merge_mm = None, 0.0
         if code == 640 and self.profile.path_tolerance:
             if "P" in by_letter:
                 tolerance = by_letter["P"].value * self.unit_mm
                 name += f" P{by_letter['P'].value:g}"
-                merges = "Q" not in by_letter or by_letter["Q"].value != 0
+                merge_mm = tolerance
             if "Q" in by_letter:
+                merge_mm = by_letter["Q"].value * self.unit_mm
                 name += f" Q{by_letter['Q'].value:g}"
         elif code != 640:
             tolerance = 0.0
-        self.path_modes.append(PathMode(line, name, tolerance, merges))
+        self.path_modes.append(PathMode(line, name, tolerance, merge_mm))

@@ -40,12 +40,13 @@ class Capture:
 
 @dataclass(frozen=True, slots=True)
 class PathMode:
-    """A change of path mode: its words, and the path tolerance in mm (None: not stated)."""
+    """A change of path mode: its words, and the path tolerance in mm (None: not stated). Moves that are
+    within `merge_mm` of one line become one."""
 
     line: int
     name: str
     tolerance_mm: float | None = None
-    merges: bool = False
+    merge_mm: float = 0.0
 
 
 #: Why a broken series is refused.

@@ -249,7 +249,7 @@ class Tolerate(Action):
     tolerance: float
 
     def run(self, state: AxisState, line: int) -> None:
-        state.path_modes.append(PathMode(line, "G64", self.tolerance * state.unit_mm, merges=False))
+        state.path_modes.append(PathMode(line, "G64", self.tolerance * state.unit_mm))
 
 
 def outside_contours(state: AxisState, what: str, line: int) -> None:

@@ -12,6 +12,7 @@ Source: LinuxCNC's manual, chapter "Trajectory Control", and the rules and const
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from olp.core.values import dataclass
 from olp.program.feeds.timing import PathControl
 from olp.trajectory.controls.base import AxisSpeeds, Control, Parameter
 from olp.trajectory.controls.moves import Moves
+from olp.trajectory.controls.naive import merged, said
 from olp.trajectory.controls.planner import Pieces
 
 #: of the acceleration: what remains along an arc
@@ -64,7 +66,8 @@ class _Corners:
 
 
 def pieces(part: Moves, limits: AxisSpeeds, values: Mapping[str, float]) -> Pieces:
-    """Moves, shortened by the blend arcs between them."""
+    """Moves, merged where they are nearly one line, and shortened by the blend arcs between them."""
+    part, own = merged(part)
     cycle_s = values["servo_period_ms"] * 1e-3
     straight = np.isinf(part.radius_mm)
     acceleration = part.least(limits.acceleration)
@@ -79,7 +82,8 @@ def pieces(part: Moves, limits: AxisSpeeds, values: Mapping[str, float]) -> Piec
         np.minimum(lowered[side], blends.slower, out=lowered[side])
     along = acceleration * lowered * np.where(straight, 1.0, ALONG)
     velocity = np.minimum(velocity, np.sqrt(lowered * round_mm2_s2))
-    return _joined(part, velocity, along, blends, cycle_s)
+    joined = _joined(part, velocity, along, blends, cycle_s)
+    return replace(joined, move=own[joined.move])
 
 
 def _corners(part: Moves, velocity: Array, limits: AxisSpeeds) -> _Corners:
@@ -234,4 +238,5 @@ CONTROL = Control(
     cycle_s=1e-3,
     stop_cycles=1.0,
     bare_mm=np.inf,
+    said=said,
 )

@@ -196,14 +196,14 @@ def test_frames_that_are_alike_are_one(setups: dict[str, Setup]) -> None:
 #: Blocks behind `HEAD` on LinuxCNC, and the changes of path mode in them: line, name, path tolerance in mm,
 #: and whether short moves are merged.
 PATH_MODES: dict[str, tuple[PathMode, ...]] = {
-    "G61": (PathMode(3, "G61", 0.0, False),),
-    "G61.1": (PathMode(3, "G61.1", 0.0, False),),
-    "G64": (PathMode(3, "G64", None, False),),
-    "G64 P0.05": (PathMode(3, "G64 P0.05", 0.05, True),),
-    "G64 P0.05 Q0.01": (PathMode(3, "G64 P0.05 Q0.01", 0.05, True),),
-    "G64 P0.05 Q0": (PathMode(3, "G64 P0.05 Q0", 0.05, False),),
-    "G64 Q0.01": (PathMode(3, "G64 Q0.01", None, False),),
-    "G20 G64 P0.1\nG61": (PathMode(3, "G64 P0.1", 2.54, True), PathMode(4, "G61", 0.0, False)),
+    "G61": (PathMode(3, "G61", 0.0),),
+    "G61.1": (PathMode(3, "G61.1", 0.0),),
+    "G64": (PathMode(3, "G64", None),),
+    "G64 P0.05": (PathMode(3, "G64 P0.05", 0.05, 0.05),),
+    "G64 P0.05 Q0.01": (PathMode(3, "G64 P0.05 Q0.01", 0.05, 0.01),),
+    "G64 P0.05 Q0": (PathMode(3, "G64 P0.05 Q0", 0.05),),
+    "G64 Q0.01": (PathMode(3, "G64 Q0.01", None, 0.01),),
+    "G20 G64 P0.1\nG61": (PathMode(3, "G64 P0.1", 2.54, 2.54), PathMode(4, "G61", 0.0)),
 }
 
 
@@ -220,7 +220,7 @@ def test_a_path_mode_has_its_path_tolerance(text: str, setups: dict[str, Setup])
 
 def test_iso_controls_have_no_path_tolerance_in_g64(setups: dict[str, Setup]) -> None:
     read = program(f"{HEAD}G64 P0.05\nG61\nM2\n", setups["fanuc"], "fanuc")
-    assert read.path_modes == (PathMode(3, "G64", None, False), PathMode(4, "G61", 0.0, False))
+    assert read.path_modes == (PathMode(3, "G64", None), PathMode(4, "G61", 0.0))
 
 
 def test_words_that_store_the_present_position_are_kept(setups: dict[str, Setup]) -> None:
