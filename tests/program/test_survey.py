@@ -133,7 +133,7 @@ def test_a_hint_to_unroll_is_given_where_that_helps() -> None:
 
 def test_a_hint_to_unroll_is_not_given_for_what_an_unrolled_program_still_has() -> None:
     (saved,) = reasons(HEAD + b"M70\n")
-    assert saved.message == "M70 saves modal codes; --flatten does not unroll it; write plain blocks"
+    assert saved.message == "M70 saves modal codes; unroll the program with --flatten"
     (repeated,) = reasons(HEAD + b"M99\n", "fanuc")
     assert repeated.message == (
         "M99 repeats the program; --flatten does not unroll it; "
@@ -367,9 +367,16 @@ def test_an_endless_loop_is_the_only_reason() -> None:
 
 
 def test_what_unrolling_leaves_is_not_hinted_at_again() -> None:
-    rows, _ = unrolled(HEAD + b"M70\nG1 X[2]\nM2\n")
+    rows, _ = unrolled(HEAD + b"G1 X[2]\nM99\n")
     assert rows == [
-        (None, 3, "OLP511", None, "M70 saves modal codes; --flatten does not unroll it; write plain blocks")
+        (
+            None,
+            4,
+            "OLP511",
+            None,
+            "M99 repeats the program; --flatten does not unroll it; write M30 in its "
+            "place where it ends a main program",
+        )
     ]
 
 

@@ -55,6 +55,7 @@ class Walk(Tasks):
         variables: Variables,
         subprograms: Callable[[str], tuple[str, bytes] | None],
         write: WriteBlock,
+        leave: Callable[[Line, Frame], None],
         *,
         block_delete: bool | None,
         budget: Budget,
@@ -62,6 +63,7 @@ class Walk(Tasks):
         self.main = main
         self.variables = variables
         self.write = write
+        self.leave = leave
         self.language = main.language
         self.block_delete = block_delete
         self.budget = budget
@@ -183,6 +185,7 @@ class Walk(Tasks):
                 f"{flow.keyword.upper()} with label {flow.label} outside of its SUB", code="OLP542"
             )
         value = flow.values[0](self.variables) if flow.values else None
+        self.leave(frame.unit.line(index), frame)
         self.variables.globals |= {"_value": filled(value), "_value_returned": float(bool(flow.values))}
         self._leave()
 
@@ -238,10 +241,9 @@ class Walk(Tasks):
         """Carry out M98, M97, M99 and G65; None where the line has none of them, else whether the run
         ends."""
         codes = {(w.letter, w.number) for w in line.words if w.letter in "mg" and w.value is None}
-        saves = self.language.saved_modes and codes & {("m", 70.0), ("m", 72.0), ("m", 73.0)}
-        if saves and (len(self._frames) > 1 or ("m", 73.0) in saves):
+        if self.language.saved_modes and ("m", 73.0) in codes and len(self._frames) == 1:
             raise ProgramError(
-                "M70, M72 and M73 act on a level of subprograms, which plain blocks do not have",
+                "M73 restores modes at the end of a subprogram, and this is none; give M70 and M72",
                 code="OLP544",
             )
         if self.language.profile_cycles and codes & _PROFILE_CYCLES:
@@ -329,6 +331,7 @@ class Walk(Tasks):
             i for i, w in enumerate(line.words) if w.letter == "p" or (w.letter == "m" and w.number == 99)
         )
         self.write(line, frame, without)
+        self.leave(line, frame)
         if frame.repeats > 0:
             frame.repeats -= 1
             frame.next_index = frame.start

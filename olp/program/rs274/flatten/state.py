@@ -96,7 +96,6 @@ class ProgramState(State):
     path: str = "G64"
     feed: float | None = None
     speed: float | None = None
-    saved: tuple[int | None, set[int], str] | None = None
     held_absolute: bool = True
     #: those that M6 may move
     tool_change_axes: tuple[int, ...] = (0, 1, 2)
@@ -177,8 +176,6 @@ class ProgramState(State):
             elif letter == "m" and value is not None:
                 if value in (3, 4, 5):
                     self.spindle = int(value)
-                elif 70 <= value <= 72 and self.profile.language.saved_modes:
-                    self._keep_modes(int(value))
                 else:
                     self._forget_moved(round(10.0 * value))
         return codes
@@ -218,22 +215,6 @@ class ProgramState(State):
             self.series.broken = True
             self.position = [p * factor for p in self.position]
             self.unit = unit
-
-    def _keep_modes(self, code: int) -> None:
-        """M70 saves the modes, M71 drops them, M72 restores them."""
-        if code == 70:
-            self.saved = (self.unit, self.in_force(), self.path)
-        elif code == 71:
-            self.saved = None
-        elif self.saved is None:
-            raise ProgramError("M72 without saved modes; M70 must come before", code="OLP532")
-        else:
-            unit, modes, self.path = self.saved
-            if unit is None and self.unit is not None:
-                self.forget()
-            self.take(modes)
-            if unit is not None:
-                self._change_unit(unit)
 
     def _path_mode(self, codes: set[int], words: Sequence[Value]) -> None:
         if 640 in codes:

@@ -145,6 +145,20 @@ class Unit:
             raise ProgramError(f"the program has {what} N{label.upper()}; expected one", code="OLP542")
         return places[0]
 
+    def refuse_library(self) -> None:
+        """Raise ProgramError for a text of subprograms that calls none of them and moves nothing itself."""
+        names = [(index, flow.label) for index, flow in self.flows() if flow.keyword == "sub"]
+        if names:
+            index, first = names[0]
+            label = first if first.isdigit() else f"<{first}>"
+            one = len(names) == 1
+            what = f"subprogram {label}" if one else f"{len(names)} subprograms, the first is {label},"
+            raise ProgramError(
+                f"nothing moves here: the file defines {what} and calls none; give the program that calls "
+                f"it, which may be one line such as `o{label} call` in a file beside this one",
+                file=self.file, line=index + 1, code="OLP542",
+            )  # fmt: skip
+
     def _numbered(self) -> dict[float, list[int]]:
         """The lines of each block number, in order. A line that is broken has none, until it is run."""
         if self._numbers is None:
@@ -176,3 +190,6 @@ class Frame:
     loops: dict[str, int] = field(default_factory=dict)
     dos: dict[str, int] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
+    #: modes that this level has saved, and whether its end restores them
+    saved: object = None
+    restores: bool = False

@@ -33,6 +33,7 @@ from olp.program.rs274.flatten.lines import Line, Word, compile_line
 from olp.program.rs274.flatten.patterns import holes, is_pattern
 from olp.program.rs274.flatten.polar import as_xy
 from olp.program.rs274.flatten.run import Walk
+from olp.program.rs274.flatten.saved_modes import SavedModes
 from olp.program.rs274.flatten.splines import SPLINE_WORDS, Splines
 from olp.program.rs274.flatten.state import CYCLE_WORDS, ProgramState, Value, tracked
 from olp.program.rs274.flatten.unit import Frame, Unit
@@ -87,29 +88,21 @@ def flatten(
         setup=setup, switch_open=block_delete is None,
     )  # fmt: skip
     main = Unit(data, profile, file)
-    visit = writer.block
     budget = Budget.of(len(data), least=limit, per_byte=UNROLLED_PER_BYTE, message=_TOO_LONG)
-    Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, budget=budget).run()
+    Walk(
+        main,
+        writer.variables,
+        subprograms,
+        writer.block,
+        writer.leave,
+        block_delete=block_delete,
+        budget=budget,
+    ).run()
     if not writer.moves:
-        _refuse_library(main)
+        main.refuse_library()
     writer.write_polar()
     writer.write_corners()
     return Unrolled.of(writer.text(main), writer.origin(main), writer.within())
-
-
-def _refuse_library(main: Unit) -> None:
-    """Raise ProgramError for a text of subprograms that calls none of them, and moves nothing by itself."""
-    names = [(index, flow.label) for index, flow in main.flows() if flow.keyword == "sub"]
-    if names:
-        index, first = names[0]
-        label = first if first.isdigit() else f"<{first}>"
-        one = len(names) == 1
-        what = f"subprogram {label}" if one else f"{len(names)} subprograms, the first is {label},"
-        raise ProgramError(
-            f"nothing moves here: the file defines {what} and calls none; give the program that calls it, "
-            f"which may be one line such as `o{label} call` in a file beside this one",
-            file=main.file, line=index + 1, code="OLP542",
-        )  # fmt: skip
 
 
 class _Flattener:
@@ -123,6 +116,7 @@ class _Flattener:
         self.state = ProgramState.of(profile, setup)
         self.variables = Variables(self.state, parameters, setup)
         self.splines = Splines(self.state)
+        self.saved = SavedModes(self.state)
         self.strokes = strokes
         #: whether blocks under block delete may run or not
         self.switch_open = switch_open
@@ -217,6 +211,12 @@ class _Flattener:
             return False
         values = [(word.letter, self._value(word)) for word in line.words]
         settings = [(a.target(self.variables), a.value(self.variables)) for a in line.assignments]
+        if self.saved.takes(values):
+            self._write(line, values, set(range(len(line.words))), exact=False)
+            self._insert(
+                self.saved.carry_out(values, frame, switched=line.deleted and self.switch_open), line
+            )
+            return False
         cut = set(without)
         for i, word in enumerate(line.words):
             if self._vacant(word, values[i][1]) or (word.letter == "n" and seen):
@@ -234,6 +234,11 @@ class _Flattener:
                 self.variables.assign(target, value)
         return any(letter == "m" and value in _ENDS for letter, value in active)
 
+    def leave(self, line: Line, frame: Frame) -> None:
+        """Carry out what the end of a subprogram restores, at the line that ends it."""
+        self._present = (frame.unit.key, line.number)
+        self._insert(self.saved.leaving(frame), line)
+
     def _carry_out(
         self, line: Line, values: list[Value], without: frozenset[int], *, exact: bool
     ) -> list[Value]:
@@ -244,6 +249,7 @@ class _Flattener:
             (values[i][0], tracked(line.words[i], values[i][1], self.language)) for i in kept
         ]
         self.variables.follow(active, switched=line.deleted)
+        self.saved.follow(active, switched=line.deleted)
         before = (self.state.absolute, self.state.path, tuple(self.state.position))
         if is_pattern(active, self.state):
             self._holes(line, values, kept)

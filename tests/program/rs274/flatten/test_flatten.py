@@ -144,7 +144,7 @@ def test_block_delete_switch() -> None:
         ("X[1+]\n", 1, "expected a number"),
         ("#1\n", 1, "without '='"),
         ("o1 blah\n", 1, "keyword"),
-        ("o1 sub\nM70\no1 endsub\no1 call\n", 2, "M70"),
+        ("o1 sub\nM72\no1 endsub\no1 call\n", 2, "M70"),
         ("G71 Q100 D1\n", 1, "G70"),
     ],
 )

@@ -325,9 +325,12 @@ def test_a_macro_may_be_called_more_than_once_with_its_own_variables() -> None:
 @pytest.mark.parametrize(
     ("source", "code", "message", "line"),
     [
-        ("o1 sub\nM70\no1 endsub\no1 call", "OLP544", "M70, M72 and M73 act", 2),
-        ("o1 sub\nM72\no1 endsub\no1 call", "OLP544", "M70, M72 and M73 act", 2),
-        ("M73", "OLP544", "M70, M72 and M73 act", 1),
+        ("o1 sub\nM72\no1 endsub\nM70\no1 call", "OLP532", "M72 without saved modes", 2),
+        ("M73", "OLP544", "M73 restores modes at the end of a subprogram, and this is none", 1),
+        ("M70 G91", "OLP518", "M70 to M73 beside other words", 1),
+        ("M70\nG43 H1\nM72", "OLP544", "the tool length is to be restored", 3),
+        ("M70\nM3 S100\nM72", "OLP544", "the spindle is to be restored", 3),
+        ("M70\nG21\nM72", "OLP544", "the unit or the return of cycles is to be restored", 3),
         ("M72", "OLP532", "M72 without saved modes; M70 must come before", 1),
         ("M70\nM71\nM72", "OLP532", "M72 without saved modes; M70 must come before", 3),
         *((f"G{code} Q1", "OLP544", "G70 to G72 are cycles of a lathe", 1)
@@ -342,10 +345,19 @@ def test_codes_of_a_level_and_of_a_profile_are_refused(
     assert error[1].startswith(message)
 
 
+def test_what_m72_restores_is_written() -> None:
+    source = "G21 G64 P0.05\nG54\nM5\n(a) M70\nG61 G55\nM3 S9\nM72 (b)\nG0 X1\nM2\n"
+    assert lcnc(source).splitlines()[3:] == [
+        "(a)", "G61 G55", "M3 S9", "(b)", "G64 P0.05", "G54", "M5", "G0 X1", "M2"
+    ]  # fmt: skip
+    # nothing has changed
+    assert lcnc("G21\no1 sub\nM73\nG0 X1\no1 endsub\no1 call\nM2\n").splitlines() == ["G21", "G0 X1", "M2"]
+
+
 def test_they_are_plain_codes_on_other_controls() -> None:
     for block in ("M70", "M72", "M73", "G70 Q1", "G71 Q1", "G72 Q1"):
         assert fanuc(f"O1\n{block}\nM30\n") == f"O1\n{block}\nM30\n"
-    assert lcnc("M71\nM2\n") == "M71\nM2\n"
+    assert lcnc("M71\nM2\n") == "M2\n"
     # on Mach3 they are units, and M70 is a macro of the builder
     source = b"G71 G91.1\n#1=5\nG0 X[#1*2]\nM70\nG70\nX#1\nM30\n"
     assert flatten(source, profile="mach3") == b"G71 G91.1\nG0 X10\nM70\nG70\nX5\nM30\n"

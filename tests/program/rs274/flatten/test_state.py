@@ -74,11 +74,6 @@ def known(block: str, profile: str = "linuxcnc", start: str = _START) -> dict[st
         ("G38.2 X5", {}), ("G38.3 X5", {}), ("G38.4 X5", {}), ("G38.5 X5", {}), ("G38.2 X5\nG1 X6", {"X": 6}),
         ("G80\nX5", {"Y": 2, "Z": 3}), ("G91 G80\nX5", {"Y": 2, "Z": 3}),
         ("G80 G1 X5", {"X": 5, "Y": 2, "Z": 3}), ("G91 G80 G1 X5", {"X": 6, "Y": 2, "Z": 3}),
-        # saved modes
-        ("M70\nG91 G20\nM72\nX5", {"X": 5, "Y": 2, "Z": 3}),
-        ("G91\nM70\nG90\nM72\nX5", {"X": 6, "Y": 2, "Z": 3}),
-        ("M70\nG91\nM71\nX5", {"X": 6, "Y": 2, "Z": 3}),
-        ("G20\nM70\nG21\nM72\nG21", {"X": 1, "Y": 2, "Z": 3}),
     ],
 )  # fmt: skip
 def test_the_position_behind_a_block(block: str, positions: dict[str, float]) -> None:
@@ -124,9 +119,6 @@ def test_before_any_unit_a_position_is_in_none() -> None:
     assert known("A1", start=start) == {"X": 1, "Y": 2, "Z": 3}
     assert known("G21", start=start) == {}
     assert known("G20 X5", start=start) == {"X": 5}
-    # modes that were saved without a unit give none back
-    assert known("M70\nG21 X4 Y5\nM72", start=start) == {}
-    assert known("M70\nM72", start=start) == {"X": 1, "Y": 2, "Z": 3}
 
 
 def test_what_fanuc_reads_in_its_own_way() -> None:
@@ -214,7 +206,7 @@ def test_the_words_of_a_cycle_are_taken_out_and_the_others_kept() -> None:
         ("", ["G61", "G0 X2", "G64"]), ("G64", ["G61", "G0 X2", "G64"]),
         ("G64 P0.05 Q0.1", ["G61", "G0 X2", "G64 P0.05 Q0.1"]), ("G64 Q0.1", ["G61", "G0 X2", "G64 Q0.1"]),
         ("G61.1", ["G61", "G0 X2", "G61.1"]), ("G61", ["G0 X2"]), ("G61\nG64", ["G61", "G0 X2", "G64"]),
-        ("G64 P1\nM70\nG61\nM72", ["G61", "G0 X2", "G64 P1"]), ("G91", ["G61", "G90", "G0 X3", "G91", "G64"]),
+        ("G91", ["G61", "G90", "G0 X3", "G91", "G64"]),
         ("G61 G91", ["G90", "G0 X3", "G91"]),
     ],
 )  # fmt: skip
