@@ -56,9 +56,9 @@ class Walk(Tasks):
         subprograms: Callable[[str], tuple[str, bytes] | None],
         write: WriteBlock,
         leave: Callable[[Line, Frame], None],
+        budget: Budget,
         *,
         block_delete: bool | None,
-        budget: Budget,
     ) -> None:
         self.main = main
         self.variables = variables

@@ -90,13 +90,7 @@ def flatten(
     main = Unit(data, profile, file)
     budget = Budget.of(len(data), least=limit, per_byte=UNROLLED_PER_BYTE, message=_TOO_LONG)
     Walk(
-        main,
-        writer.variables,
-        subprograms,
-        writer.block,
-        writer.leave,
-        block_delete=block_delete,
-        budget=budget,
+        main, writer.variables, subprograms, writer.block, writer.leave, budget, block_delete=block_delete
     ).run()
     if not writer.moves:
         main.refuse_library()
@@ -122,8 +116,7 @@ class _Flattener:
         self.switch_open = switch_open
         #: whether a block has words of axes, and whether one asks for a corner
         self.moves = self.corners = False
-        self.expand_cycles = expand_cycles
-        self.peck_clearance = peck_clearance
+        self.expand_cycles, self.peck_clearance = expand_cycles, peck_clearance
         self._seen: set[tuple[int, int]] = set()
         self._blocks: list[tuple[bytes, bytes]] = []
         # the unit and the line that each block was made from, and those of the present line
@@ -213,9 +206,8 @@ class _Flattener:
         settings = [(a.target(self.variables), a.value(self.variables)) for a in line.assignments]
         if self.saved.takes(values):
             self._write(line, values, set(range(len(line.words))), exact=False)
-            self._insert(
-                self.saved.carry_out(values, frame, switched=line.deleted and self.switch_open), line
-            )
+            switched = line.deleted and self.switch_open
+            self._insert(self.saved.carry_out(values, frame, switched=switched), line)
             return False
         cut = set(without)
         for i, word in enumerate(line.words):
