@@ -40,14 +40,27 @@ class Places:
 
     def poses(self, path: JointPath) -> tuple[Array, Poses]:
         """(r, axes) commanded axis values there, and the poses of the machine with its errors."""
-        tool = path.tool[self.rows]
-        axes = path.motion.axes(path.at(self.rows, self.part), tool, path.tip[self.rows])
-        return axes, path.motion.actual(axes, tool, self.side)
+        return self._poses(path, path.at(self.rows, self.part))
 
     def targets(self, nominal: JointPath) -> Poses:
         """(r) the nominal poses, where the part lies."""
-        place, tool = nominal.at(self.move, self.share), nominal.tool[self.move]
-        target = nominal.motion.targets(place, tool, nominal.tip[self.move])
+        return self._targets(nominal, nominal.at(self.move, self.share))
+
+    def both(self, nominal: JointPath, path: JointPath) -> tuple[Array, Poses, Poses]:
+        """What `poses` and `targets` are. On the nominal path itself its own places are found once."""
+        place = along = path.at(self.rows, self.part)
+        own = path is nominal and np.array_equal(self.rows, self.move)
+        if not (own and np.array_equal(self.part, self.share)):
+            along = nominal.at(self.move, self.share)
+        return *self._poses(path, place), self._targets(nominal, along)
+
+    def _poses(self, path: JointPath, place: Array) -> tuple[Array, Poses]:
+        tool = path.tool[self.rows]
+        axes = path.motion.axes(place, tool, path.tip[self.rows])
+        return axes, path.motion.actual(axes, tool, self.side)
+
+    def _targets(self, nominal: JointPath, place: Array) -> Poses:
+        target = nominal.motion.targets(place, nominal.tool[self.move], nominal.tip[self.move])
         return Poses(target.rotation, target.position + nominal.shift_mm[self.move])
 
 

@@ -266,7 +266,7 @@ class _Sums:
     def add(self, nominal: JointPath, path: JointPath, places: Places) -> None:
         if not len(places.rows):
             return
-        (axes, actual), target = places.poses(path), places.targets(nominal)
+        axes, actual, target = places.both(nominal, path)
         unknown = _unknown(path, places, axes)
         both = np.stack(deviations(path.motion.structure, actual, target), axis=1) + unknown
         np.maximum.at(self.unknown, places.move, unknown)

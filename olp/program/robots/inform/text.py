@@ -48,6 +48,8 @@ class Header:
     def with_line(self, name: bytes, value: bytes, line: bytes) -> Header:
         """The same behind another line of a header."""
         key = _key(name)
+        if (key, line) in self.lines:
+            return self
         values = {"user": self.user, "tool": self.tool, "kind": self.kind, "form": self.form,
                   "posture": self.posture, key: name if name in _FORMS else value}  # fmt: skip
         lines = {**dict(self.lines), key: line}

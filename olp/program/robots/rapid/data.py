@@ -25,8 +25,10 @@ from olp.program.robots.rapid.values import (
 from olp.program.robots.targets import Span
 
 _DECLARED = pattern(
-    rb"(?is)(?:(?:LOCAL|TASK)\s+)?(CONST|PERS|VAR)\s+(\w+)\s+(\w+)\s*(\{[^}]*\})?\s*(?::=\s*(.*?))?\s*"
+    rb"(?is)(?:(?:LOCAL|TASK)\s+)?(CONST|PERS|VAR)\s+(\w+)\s+(\w+)\s*(\{[^}]*\})?\s*(?::=\s*(.*\S|))?\s*"
 )
+#: The first words of declarations.
+_DECLARING = frozenset((b"LOCAL", b"TASK", b"CONST", b"PERS", b"VAR"))
 _SPEED = pattern(rb"\[\s*" + NUMBER + rb"\s*,.*\]\s*")
 _NAME = pattern(rb"[A-Za-z]\w*")
 #: Data that are given to others in turn.
@@ -93,7 +95,7 @@ class Declared:
 
     def declare(self, statement: Statement, scope: Scope) -> bool:
         """Whether a statement declares data, which are kept."""
-        match = _DECLARED.fullmatch(statement.text)
+        match = _DECLARED.fullmatch(statement.text) if statement.word in _DECLARING else None
         if match is None:
             return False
         start = statement.begin

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from itertools import zip_longest
 
 from olp.core.patterns import pattern
@@ -47,12 +46,6 @@ def routine_of(statement: Statement) -> str:
     """The name of a routine that a statement begins, in capitals."""
     match = _PROC.match(statement.text) or _ROUTINE.match(statement.text)
     return "" if match is None else match[match.lastindex or 1].decode("latin-1").upper()
-
-
-def word_of(statement: Statement) -> bytes:
-    """The first word of a statement in capitals; empty where it has none."""
-    match = _WORD.match(statement.text)
-    return b"" if match is None else match[1].upper()
 
 
 def parameters_of(statement: Statement) -> list[str]:
@@ -142,7 +135,7 @@ def inner_move(statement: Statement) -> Statement | None:
         word = match[1].upper()
         if word in FORMS or word in JOINT_MOVES:
             begin = statement.begin + match.start(1)
-            return replace(statement, begin=begin, text=statement.text[match.start(1) :])
+            return Statement.of(statement.line, begin, statement.end, statement.text[match.start(1) :])
     return None
 
 
@@ -166,8 +159,7 @@ def given_in(statement: Statement, changing: Mapping[bytes, list[bool]]) -> list
     """The names that may get another value in a statement, in capitals: those that it assigns, and what it
     gives to a routine or an instruction. A move changes no data but the point that a search has found.
     `changing` are routines of the text, as `changing_parameters` has them."""
-    text = statement.text
-    word = word_of(statement)
+    text, word = statement.text, statement.word
     inner = inner_move(statement) if word == IF else None
     if inner is not None:
         return given_in(inner, changing)
@@ -200,7 +192,7 @@ def moving_routines(statements: Sequence[Statement]) -> tuple[set[str], set[str]
             continue
         if current is None or statement.block or is_assignment(statement):
             continue
-        word = word_of(statement)
+        word = statement.word
         row = TABLE.get(word)
         if (
             (word == IF and calls(statement.text))

@@ -117,7 +117,7 @@ class _Reader:
             return
         if not statement.text.strip():
             return
-        word = flow.word_of(statement)
+        word = statement.word
         if word in FORMS or word in JOINT_MOVES:
             self._any_move(statement, word)
         elif word == flow.IF:
@@ -168,7 +168,7 @@ class _Reader:
         move = flow.inner_move(statement)
         if move is not None:
             # parts of it would stand before the IF
-            self._any_move(move, flow.word_of(move), whole=True)
+            self._any_move(move, move.word, whole=True)
             self._unknown()
         elif flow.may_move(statement.text):
             raise ProgramError(

@@ -30,19 +30,28 @@ _BLOCK = pattern(
     rb"(?P<label>[A-Za-z]\w*\s*:(?!=)))"
 )
 _STATEMENT = pattern(rb"(?:[^;\"!]|\"[^\"\r\n]*\"|![^\r\n]*)*;")
+_WORD = pattern(rb"\s*([A-Za-z]\w*)")
 _COMMENT = pattern(rb"\"[^\"\r\n]*\"|![^\r\n]*")
 
 
 @dataclass(frozen=True, slots=True)
 class Statement:
     """A statement from byte `begin` to byte `end`, its semicolon left out. `block` is what it is where it
-    ends without a semicolon: a name of `_BLOCK`, else "". `text` has blanks in place of comments."""
+    ends without a semicolon: a name of `_BLOCK`, else "". `text` has blanks in place of comments, and `word`
+    is its first word in capitals, empty where it begins with something else."""
 
     line: int
     begin: int
     end: int
     text: bytes
-    block: str = ""
+    block: str
+    word: bytes
+
+    @staticmethod
+    def of(line: int, begin: int, end: int, text: bytes, block: str = "") -> Statement:
+        """With its first word."""
+        word = _WORD.match(text)
+        return Statement(line, begin, end, text, block, b"" if word is None else word[1].upper())
 
 
 class Lines:
@@ -68,21 +77,32 @@ def statements(data: bytes, lines: Lines) -> Iterator[Statement]:
         line = lines.of(place)
         block = _BLOCK.match(data, place)
         if block is not None:
-            yield Statement(line, place, block.end(), block[0], block.lastgroup or "")
+            yield Statement.of(line, place, block.end(), block[0], block.lastgroup or "")
             place = block.end()
             continue
-        match = _STATEMENT.match(data, place)
-        if match is None:
+        end, text = _end_of(data, place)
+        if end < 0:
             raise ProgramError(
                 f"`{_shown(data[place : place + 60])}` has no semicolon at its end",
                 line=line,
                 code="OLP510",
             )
-        text = match[0][:-1]
-        if b"!" in text:
-            text = _COMMENT.sub(_blanked, text)
-        yield Statement(line, place, match.end() - 1, text)
-        place = match.end()
+        yield Statement.of(line, place, end, text)
+        place = end + 1
+
+
+def _end_of(data: bytes, place: int) -> tuple[int, bytes]:
+    """Where a statement ends that begins at a byte, -1 where it has no end, and its text with blanks in place
+    of comments."""
+    end = data.find(b";", place)
+    text = data[place:end]
+    # a semicolon may stand in a string or a comment
+    if end < 0 or (b'"' not in text and b"!" not in text):
+        return end, text
+    match = _STATEMENT.match(data, place)
+    if match is None:
+        return -1, b""
+    return match.end() - 1, _COMMENT.sub(_blanked, match[0][:-1])
 
 
 def _blanked(hit: re.Match[bytes]) -> bytes:

@@ -33,8 +33,9 @@ def nested(lines: Iterable[Line]) -> Iterator[tuple[Line, bytes, list[Block]]]:
     which they are, the one that they begin included."""
     open_: list[Block] = []
     for line in lines:
-        match, function = _WORD.match(line.text), FUNCTION.match(line.text)
+        match = _WORD.match(line.text)
         word = b"" if match is None else match[1]
+        function = FUNCTION.match(line.text) if word in FUNCTIONS else None
         if word in (*FUNCTIONS, *LOOPS, b"if"):
             open_.append(Block(word, line.line, b"" if function is None else function[1]))
         elif word == b"end" and open_:

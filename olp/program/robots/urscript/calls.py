@@ -49,7 +49,7 @@ class Calls:
             own = self._calls.setdefault(name, set()) if name else set()
             if word in FUNCTIONS:
                 continue
-            if (run := _RUN.search(line.text)) is not None:
+            if b"run" in line.text and (run := _RUN.search(line.text)) is not None:
                 self._threads.setdefault(run[1], set()).add(run[2])
             own |= _called(line.text)
 

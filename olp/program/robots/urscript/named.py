@@ -23,7 +23,7 @@ from olp.program.robots.urscript.blocks import (
 )
 from olp.program.robots.urscript.text import Line
 
-ASSIGNED = pattern(rb"\s*(?:(global|local)\s+)?([A-Za-z_]\w*)\s*=(?!=)\s*(.*?)\s*")
+ASSIGNED = pattern(rb"\s*(?:(global|local)\s+)?([A-Za-z_]\w*)\s*=(?!=)\s*(.*\S|)\s*")
 ELEMENT = pattern(rb"\s*(?:(global|local)\s+)?([A-Za-z_]\w*)\s*\[[^\]]*\]\s*=(?!=)")
 _PARAMETER = pattern(rb"\s*([A-Za-z_]\w*)")
 

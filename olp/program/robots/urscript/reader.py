@@ -71,6 +71,8 @@ class _Reader:
         self.data, self.setup = data, setup
         self.moves = RobotMoves(data, setup, "base", _MM_PER_M)
         self.targets: dict[Span, int] = {}
+        #: frames by their text, and by the bytes of the pose where that is a name
+        self.frames: dict[tuple[bytes, Span | None], Located] = {}
         #: joints near which poses are reached by a movej, by the places of these
         self.near: dict[int, tuple[float, ...]] = {}
         #: functions of the text
@@ -327,11 +329,10 @@ class _Reader:
         frame, stated = self.moves.frames.world, _TRANSFORMED.fullmatch(text)
         if stated is not None:
             parts = list(_ARGUMENT.finditer(stated[1]))
-            outer = self._pose(parts[0][0]) if len(parts) == 2 else None
-            if outer is None:
+            located = self._frame(line, parts[0][0]) if len(parts) == 2 else None
+            if located is None:
                 raise self._computed(line, text)
-            name = b"".join(parts[0][0].split()).decode("latin-1")
-            frame = self.moves.frames.located(f"pose_trans {name}", outer, line.line)
+            frame = located
             begin, text = begin + stated.start(1) + parts[1].start(), parts[1][0]
         blank = len(text) - len(text.lstrip())
         span = (begin + blank, begin + len(text.rstrip()))
@@ -352,6 +353,17 @@ class _Reader:
                 (match.span(4), match.span(5), match.span(6)),
             )  # fmt: skip
         return self.targets[key], span, NOWHERE if named is None else span, frame
+
+    def _frame(self, line: Line, text: bytes) -> Located | None:
+        """The frame that a pose, or the name of one, is; None where there is none with numbers."""
+        named = self.names.get(text)
+        key = text, None if named is None else named.value
+        if key not in self.frames:
+            pose, name = self._pose(text), b"".join(text.split()).decode("latin-1")
+            if pose is None:
+                return None
+            self.frames[key] = self.moves.frames.located(f"pose_trans {name}", pose, line.line)
+        return self.frames[key]
 
     def _computed(self, line: Line, text: bytes) -> DecidedInRun:
         shown = text.strip()[:60].decode("latin-1")

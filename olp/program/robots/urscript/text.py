@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
+from olp.core.patterns import pattern
 from olp.core.values import dataclass
+
+_STRING = pattern(rb"\"[^\"]*\"|'[^']*'")
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +39,9 @@ def _each_line(data: bytes) -> Iterator[Line]:
     place = 3 if data[:3] == b"\xef\xbb\xbf" else 0
     for number, raw in enumerate(data[place:].splitlines(keepends=True), 1):
         text = raw.rstrip(b"\r\n")
-        bare = re.sub(rb"\"[^\"]*\"|'[^']*'", lambda hit: b"_" * len(hit[0]), text)
-        text = bare[: bare.find(b"#")] if b"#" in bare else bare
+        if b'"' in text or b"'" in text:
+            text = _STRING.sub(lambda hit: b"_" * len(hit[0]), text)
+        text = text[: text.find(b"#")] if b"#" in text else text
         yield Line(number, place, text.rstrip())
         place += len(raw)
 

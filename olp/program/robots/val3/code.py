@@ -16,7 +16,7 @@ _ENTITIES = {b"&lt;": b"<", b"&gt;": b">", b"&amp;": b"&", b"&quot;": b'"', b"&a
 _ENTITY = pattern(rb"&(?:lt|gt|amp|quot|apos);")
 _MARKUP = pattern(rb"[^\r\n]")
 _STRING = pattern(rb'"(?:[^"\\]|\\.)*"?')
-_CODE = pattern(rb'(?:[^/"]|"(?:[^"\\]|\\.)*"?|/(?!/))*')
+_CODE = pattern(rb'(?:[^/"]++|"(?:[^"\\]|\\.)*"?|/(?!/))*')
 _OPENS = frozenset(("if", "while", "for", "do", "switch"))
 _PARTS = frozenset(("else", "elseif", "case", "default"))
 _CLOSES = {"endif": "if", "endwhile": "while", "endfor": "for", "endswitch": "switch", "until": "do"}
@@ -105,7 +105,9 @@ def _statements(data: bytes, code: Element, line_of: Lines) -> list[Line]:
         stop = len(whole) if end is None else end.start()
         match = _CODE.match(whole, place, stop)
         assert match is not None
-        text = _STRING.sub(_hidden, match[0].strip())
+        text = match[0].strip()
+        if b'"' in text:
+            text = _STRING.sub(_hidden, text)
         if text:
             lead = len(match[0]) - len(match[0].lstrip())
             found.append(Line(number, begin + place + lead, text))

@@ -142,9 +142,10 @@ class Reader:
         for part in parts:
             for name in part.attributes:
                 words[name] = part.text(self.data, name)
+        # of two the first one counts
+        spans = {name: place for part in reversed(parts) for name, place in part.attributes.items()}
         for k, name in enumerate(NUMBERS[kind]):
-            span = next((part.attributes[name] for part in parts if name in part.attributes), None)
-            slots[name] = self._slot(span, host.begin + 1 + k)
+            slots[name] = self._slot(spans.get(name), host.begin + 1 + k)
         span = (value.begin, value.end)
         return Entry(
             own, self.line_of(value.begin), span, (host.begin, host.head), index, slots, words, father

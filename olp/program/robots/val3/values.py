@@ -15,8 +15,8 @@ from olp.program.text.numbers import LARGEST
 REFERENCE = pattern(rb"([A-Za-z_]\w*(?::\w+)?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*((?:\.\s*\w+\s*)*)")
 CALL = pattern(rb"(?s)([$A-Za-z_][\w:]*)\s*\((.*)\)")
 _NUMBER = pattern(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-_QUOTE = ord('"')
-_COMMA = ord(",")
+#: Bytes that say where an argument ends.
+_PARTING = pattern(rb"[\"()\[\]{},]")
 _MARKS = (b"()", b"{}", b"[]")
 
 
@@ -104,16 +104,17 @@ def balanced(text: bytes) -> bool:
 def arguments(text: bytes, begin: int) -> list[Span]:
     """The bytes of the arguments of a list that begins at a byte, without blanks around them."""
     found, depth, first, quoted = [], 0, 0, False
-    for place, byte in enumerate(text + b","):
-        if byte == _QUOTE:
+    for match in _PARTING.finditer(text + b","):
+        mark, place = match[0], match.start()
+        if mark == b'"':
             quoted = not quoted
         elif quoted:
             continue
-        elif byte in b"([{":
+        elif mark in b"([{":
             depth += 1
-        elif byte in b")]}":
+        elif mark in b")]}":
             depth -= 1
-        elif byte == _COMMA and depth == 0:
+        elif depth == 0:
             own = text[first:place]
             lead = begin + first + len(own) - len(own.lstrip())
             found.append((lead, lead + len(own.strip())))
