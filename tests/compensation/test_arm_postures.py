@@ -32,3 +32,21 @@ def test_a_series_of_straight_moves_goes_on_near_by() -> None:
         for k in range(count):
             last = nearest(last[None], postures[k][None])[0]
             assert np.abs(found[k] - last).max() < 1e-9
+
+
+def test_a_target_without_words_is_reached_near_by_where_other_postures_are_none() -> None:
+    """Far out the arm does not get there from behind."""
+    judge, arm = Arm(MACHINE), arm_of(load_joint_machine(MACHINE).structure)
+    assert arm is not None
+    goal = np.array([10.0, 75.0, -80.0, 20.0, 40.0, 30.0])
+    rotation, place = judge.pose(goal)
+    flange = Poses(rotation[None], place[None])
+    postures, yes, no = arm.postures(flange), np.ones(1, bool), np.zeros(1, bool)
+    there = np.isfinite(postures[:, :, 0])
+    assert 0 < there.sum() < 8
+    wanted = Wanted(
+        flange, np.full((1, 6), np.nan), postures, there, no, no, yes, no, np.zeros(1, np.int64),
+        np.ones(1, np.int64),
+    )  # fmt: skip
+    found = Settled(arm, wanted, postures, np.array([[-400.0] * 6, [400.0] * 6])).axes(goal + 1.0)
+    assert np.abs(found[0] - goal).max() < 1e-7

@@ -181,7 +181,8 @@ class Settled:
         if np.isinf(away[order[0]]):
             return np.full(AXES, np.nan)
         found = near[order[0]]
-        others = np.array([row for row in order[1:] if not _same(near[row], found)], np.int64)
+        within = [row for row in order[1:] if np.isfinite(away[row])]
+        others = np.array([row for row in within if not _same(near[row], found)], np.int64)
         if self.wanted.open[k] and others.size and away[others[0]] < _APART * away[order[0]]:
             raise _refused(
                 "the target does not state its configuration, and two postures are about as near to the one "
