@@ -98,9 +98,13 @@ class Group:
 Bounds = Callable[[TimeSpline, bool], list[Group]]
 
 
-def least_time(spline: TimeSpline, bounds: Bounds, size_mm: float) -> TimeSpline:
+def least_time(
+    spline: TimeSpline, bounds: Bounds, size_mm: float, good: Callable[[TimeSpline], bool]
+) -> TimeSpline:
     """The spline of least time, from one strictly within the bounds. The first three and the last three
-    coefficients are kept; others move by about `size_mm`."""
+    coefficients are kept; others move by about `size_mm`. It is the last one on the way there that is `good`,
+    or the first one."""
+    kept = spline
     groups = bounds(spline, True)
     slacks = [group.slack() for group in groups]
     whole = spline.duration_s
@@ -125,6 +129,8 @@ def least_time(spline: TimeSpline, bounds: Bounds, size_mm: float) -> TimeSpline
                 break
             continue
         spline = there
+        if good(spline):
+            kept = spline
         dual_length = _advance(duals, slacks, changes, mu)
         groups = bounds(spline, True)
         slacks = [group.slack() for group in groups]
@@ -136,7 +142,7 @@ def least_time(spline: TimeSpline, bounds: Bounds, size_mm: float) -> TimeSpline
         times.append(spline.duration_s)
         if mu * count < _BARRIER and times[-1] > (1.0 - _DONE) * times[max(len(times) - 1 - _OVER, 0)]:
             break
-    return spline
+    return kept
 
 
 def _newton(

@@ -62,8 +62,8 @@ def in_tube(route: Route, limits: AxisLimits, motion: Motion) -> Motion:
     flat = Motion(motion.start_s, motion.time, motion.path[:, :, moves], motion.shape, motion.line)
     spline, tube, segment = _start(own, some, flat)
     tube = tube.from_here(spline)
-    found = least_time(spline, tube.bounds, float(own.tolerance_mm[1:-1].min()))
-    if found.duration_s >= motion.duration_s or not tube.forward(found):
+    found = least_time(spline, tube.bounds, float(own.tolerance_mm[1:-1].min()), tube.forward)
+    if found.duration_s >= motion.duration_s:
         raise CannotCompute("no faster motion is found inside the tube")
     planned = found.motion(segment)
     path = np.zeros((len(planned.path), 4, route.point_mm.shape[1]))
