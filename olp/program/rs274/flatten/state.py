@@ -49,6 +49,7 @@ from olp.program.rs274.cycles import (
 from olp.program.rs274.flatten.expressions import whole
 from olp.program.rs274.flatten.language import Language
 from olp.program.rs274.flatten.lines import Word
+from olp.program.rs274.flatten.start import Start
 from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.state import BROKEN_SERIES, NAN, OPEN_RETRACT, TURNED_SERIES, State
 
@@ -99,18 +100,22 @@ class ProgramState(State):
     held_absolute: bool = True
     #: those that M6 may move
     tool_change_axes: tuple[int, ...] = (0, 1, 2)
+    #: where axes stand that nothing has moved yet
+    start: Start | None = None
 
     @staticmethod
     def of(profile: Profile, setup: Setup | None) -> ProgramState:
         """The state at the start of a program; the axes that M6 may move are those of `setup`."""
         moves = AXES if setup is None else setup.machine.tool_change_moves
-        return ProgramState(
-            profile, tool_change_axes=tuple(i for i, axis in enumerate(AXES) if axis in moves)
-        )
+        axes = tuple(i for i, axis in enumerate(AXES) if axis in moves)
+        start = Start(setup) if setup is not None and profile.language.tool_variables else None
+        return ProgramState(profile, tool_change_axes=axes, start=start)
 
     def position_of(self, axis: int) -> float:
         """Program position of an axis; ProgramError where it is not known."""
         value = self.position[axis]
+        if math.isnan(value) and self.start is not None and not self.odd_frame:
+            value = self.start.position_mm(axis) / self.unit_mm
         if math.isnan(value) or self.compensated:
             raise ProgramError(
                 f"the position of {AXES[axis]} is needed here and not known off line; "
@@ -118,6 +123,11 @@ class ProgramState(State):
                 code="OLP524",
             )
         return value
+
+    def leave_start(self, words: Sequence[Value]) -> None:
+        """Take a block that was carried out: what it moves no longer stands at the start."""
+        if self.start is not None:
+            self.start.follow(self.codes(words), words, cycle=self.motion in CYCLES)
 
     def codes(self, words: Sequence[Value]) -> set[int]:
         codes = {round(value * 10) for letter, value in words if letter == "g" and value is not None}
@@ -183,10 +193,12 @@ class ProgramState(State):
     def _forget_moved(self, code: int) -> None:
         """The position of axes that an M code, ten times its number, may move is not known from here on."""
         profile = self.profile
-        if code == TOOL_CHANGE:
-            self.forget(self.tool_change_axes)
-        elif code not in profile.still_m and not (profile.m61_sets_tool and code == SET_TOOL):
-            self.forget()
+        if code in profile.still_m or (profile.m61_sets_tool and code == SET_TOOL):
+            return
+        moved = self.tool_change_axes if code == TOOL_CHANGE else (0, 1, 2)
+        self.forget(moved)
+        if self.start is not None:
+            self.start.moved(moved)
 
     def _after(self, codes: set[int]) -> None:
         if 400 in codes and self.compensated:

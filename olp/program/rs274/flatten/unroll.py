@@ -146,9 +146,7 @@ class _Flattener:
         if not self.corners:
             return
         with self._errors():
-            placed = with_corners(
-                self._blocks, self.state.profile, self._length, switch=self.switch_open
-            )  # fmt: skip
+            placed = with_corners(self._blocks, self.state.profile, self._length, switch=self.switch_open)
         self._blocks = [(raw, eol) for raw, eol, _ in placed]
         self._sources = [self._sources[k] for _, _, k in placed]
         self._within = [self._within[k] for _, _, k in placed]
@@ -216,6 +214,7 @@ class _Flattener:
         start = list(self.state.position)
         for _ in range(self._polar_repeats(line, values, cut)):
             active = self._carry_out(line, values, frozenset(cut), exact=frame.unit.radius_arcs)
+            self.state.leave_start(active)
         if line.deleted and self.switch_open:
             # where the switch leaves the block out, the axes are still where they were
             self.state.forget(axis for axis in range(3) if self.state.position[axis] != start[axis])
@@ -275,6 +274,7 @@ class _Flattener:
             block = compile_line((mark + text).encode() + line.eol, line.number, self.language)
             words: list[Value] = [(word.letter, word.number) for word in block.words]
             self._carry_out(block, words, frozenset(), exact=False)
+            self.state.leave_start(words)
 
     def _holes(self, line: Line, values: list[Value], kept: list[int]) -> None:
         """Write a pattern of holes, one by one."""
