@@ -27,6 +27,7 @@ class Language:
     - `corners`: what rounds or chamfers a corner between two moves (`,r`, `,c`).
     - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
     - `splines`: G5 to G5.3 are splines, and `@` and `^` radius and angle.
+    - `repeats_keep_locals`: G65 with L sets its arguments for the first repetition only.
     - `counts_in_p`: P of M98 has the count in front of four digits of the number. `shared_locals`: M98 keeps
       the local variables of its caller. `calls_none`: L0 of M98 calls nothing. `calls_at_q`: Q of M98 is the
       block at which the subprogram begins, in the same program without P.
@@ -50,6 +51,7 @@ class Language:
     splines: bool
     counts_in_p: bool
     shared_locals: bool
+    repeats_keep_locals: bool = False
     calls_none: bool
     calls_at_q: bool = False
     increments_open: bool

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 from olp.program.rs274.codes import CYCLES, HOMES, MACHINE
@@ -28,16 +30,22 @@ class Modal:
     locals: dict[int, float | None] | None = None
 
     def called(self) -> dict[int, float | None]:
-        """Local variables of the next call. Whether controls set the arguments again is not stated, so those
-        that a call has changed are unsettled until they are assigned."""
+        """Local variables of the next call."""
         last = self.arguments if self.locals is None else self.locals
-        changed: dict[int, float | None] = {
-            index: UNSETTLED
-            for index in last.keys() | self.arguments.keys()
-            if last.get(index) != self.arguments.get(index)
-        }
-        self.locals = self.arguments | changed
+        self.locals = self.arguments | unsettled(last, self.arguments)
         return self.locals
+
+
+def unsettled(
+    last: Mapping[int, float | None], arguments: Mapping[int, float | None]
+) -> dict[int, float | None]:
+    """Local variables that the last call of a macro has changed. Whether controls set the arguments again is
+    not stated, so they are unsettled until they are assigned."""
+    return {
+        index: UNSETTLED
+        for index in last.keys() | arguments.keys()
+        if last.get(index) != arguments.get(index)
+    }
 
 
 def moves(line: Line, variables: Variables) -> bool:

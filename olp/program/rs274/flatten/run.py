@@ -8,7 +8,7 @@ from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.program.rs274.flatten.expressions import filled, whole
 from olp.program.rs274.flatten.lines import Flow, Line
-from olp.program.rs274.flatten.modal import Modal, moves
+from olp.program.rs274.flatten.modal import Modal, moves, unsettled
 from olp.program.rs274.flatten.tasks import Tasks
 from olp.program.rs274.flatten.unit import Frame, Unit
 from olp.program.rs274.flatten.values import Variables, macro_arguments
@@ -334,6 +334,8 @@ class Walk(Tasks):
         self.leave(line, frame)
         if frame.repeats > 0:
             frame.repeats -= 1
+            if frame.arguments is not None:
+                frame.locals |= unsettled(frame.locals, frame.arguments)
             frame.next_index = frame.start
             return False
         target = self._word(line, "p")
@@ -377,4 +379,9 @@ class Walk(Tasks):
         if modal:
             self._modal = Modal(unit, start + 1, label, repeats, arguments)
         else:
-            self._enter(Frame(unit, start + 1, label, arguments, {}, start=start + 1, repeats=repeats))
+            again = None if self.language.repeats_keep_locals else dict(arguments)
+            self._enter(
+                Frame(
+                    unit, start + 1, label, arguments, {}, start=start + 1, repeats=repeats, arguments=again
+                )
+            )

@@ -1,7 +1,7 @@
 """Where the axes of a program of LinuxCNC stand before it moves them, in its own coordinates.
 
 The job states axis positions (`start_mm`). Less the work offset in force they are positions of the program,
-as long as no tool length and no further shift is in force. Each axis keeps its place until something moves it.
+as long as no tool length and no further shift is in force. An axis keeps its place until something moves it.
 """
 
 from __future__ import annotations

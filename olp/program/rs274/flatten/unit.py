@@ -6,6 +6,7 @@ import bisect
 import contextlib
 import itertools
 import re
+from collections.abc import Mapping
 from dataclasses import field
 
 from olp.core.errors import ProgramError
@@ -183,6 +184,8 @@ class Frame:
     start: int = 0
     repeats: int = 0
     modal: bool = False
+    #: the arguments of a macro whose next repetition may have them again
+    arguments: Mapping[int, float | None] | None = None
     #: the line of the program itself that this level runs in, 0 for the program, and the number of that run
     within: int = 0
     run: int = 0

@@ -148,8 +148,8 @@ class Variables:
             value = self.locals.get(index)
             if value is UNSETTLED:
                 raise ProgramError(
-                    f"#{index} was changed by the last call of this macro of G66, and whether the next call "
-                    "has its argument again is not known; assign it in the macro first",
+                    f"#{index} was changed by the last call of this macro, and whether the next call has its "
+                    "argument again is not known; assign it in the macro first",
                     code="OLP541",
                 )
             return value

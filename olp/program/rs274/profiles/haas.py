@@ -56,6 +56,7 @@ DIALECT = replace(
     tip_codes=frozenset({2340}),
     cycles=HAAS_CYCLES,
     inert=pattern(STILL_LINES + counting(rb"(?:10\d|[1-9])\d\d")),
-    language=replace(MACRO_B, hole_patterns=True, common_again=_COMMON_AGAIN),
+    # the manual 96-8000 says of L of G65 that arguments are set on the first repetition only
+    language=replace(MACRO_B, hole_patterns=True, common_again=_COMMON_AGAIN, repeats_keep_locals=True),
     path_mode="the control's own smoothing (G187)",
 )

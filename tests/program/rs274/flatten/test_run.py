@@ -319,7 +319,14 @@ def test_m99_returns_to_a_block_of_the_caller() -> None:
 
 def test_a_macro_may_be_called_more_than_once_with_its_own_variables() -> None:
     source = "O1\nG65 P2 A1. L2\nM30\nO2\nX#1\n#1=#1+1\nM99\n"
-    assert fanuc(source) == "O1\nX1.\nX2.\nM30\n"
+    assert flatten(source.encode(), profile="haas") == b"O1\nX1.\nX2.\nM30\n"
+    # whether other controls set the argument again is not stated
+    assert refused(source, "fanuc")[:2] == (
+        "OLP541", "#1 was changed by the last call of this macro, and whether the next call has its argument "
+        "again is not known; assign it in the macro first",
+    )  # fmt: skip
+    assert fanuc(source.replace("#1=#1+1", "#2=9.")) == "O1\nX1.\nX1.\nM30\n"
+    assert fanuc("O1\nG65 P2 A1. L2\nM30\nO2\n#2=#1\nX#2\n#2=5\nM99\n") == "O1\nX1.\nX1.\nM30\n"
 
 
 @pytest.mark.parametrize(
