@@ -136,7 +136,7 @@ class Walk(Tasks):
                 self._enter(
                     Frame(
                         modal.unit, modal.start, modal.label, modal.called(), {}, start=modal.start,
-                        repeats=modal.repeats, modal=True,
+                        repeats=modal.repeats, modal=True, arguments=self._set_again(modal.arguments),
                     )
                 )  # fmt: skip
         return ended
@@ -358,6 +358,10 @@ class Walk(Tasks):
             return
         raise ProgramError(why, code="OLP544")
 
+    def _set_again(self, arguments: dict[int, float | None]) -> dict[int, float | None] | None:
+        """The arguments that repetitions of a macro may have again, None where each has what the last left."""
+        return None if self.language.repeats_keep_locals else dict(arguments)
+
     def _macro(self, line: Line, frame: Frame, *, modal: bool) -> None:
         number, name = self._word(line, "p"), "G66" if modal else "G65"
         if number is None:
@@ -379,7 +383,7 @@ class Walk(Tasks):
         if modal:
             self._modal = Modal(unit, start + 1, label, repeats, arguments)
         else:
-            again = None if self.language.repeats_keep_locals else dict(arguments)
+            again = self._set_again(arguments)
             self._enter(
                 Frame(
                     unit, start + 1, label, arguments, {}, start=start + 1, repeats=repeats, arguments=again

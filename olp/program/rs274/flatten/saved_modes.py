@@ -59,8 +59,8 @@ class SavedModes:
         for name, own in _MODES.items():
             stated = codes & own
             if stated:
-                numbers = "".join(f" {letter}{value}" for letter, value in words if letter in ("h", "d", "p"))
-                self._further[name] = "?" if switched else f"G{next(iter(stated)) / 10:g}{numbers}"
+                beside = "".join(f" {letter}{value}" for letter, value in words if letter in ("h", "d", "p"))
+                self._further[name] = "?" if switched else f"G{next(iter(stated)) / 10:g}{beside}"
         for letter, value in words:
             for name, numbers in _M_MODES.items() if letter == "m" else ():
                 if value in numbers:
