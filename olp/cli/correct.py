@@ -66,7 +66,8 @@ LAST_DIGITS_UM = 10.0
 @click.option(
     "--times",
     is_flag=True,
-    help="State how long both programs take, as olp retime plans; --report always does.",
+    help="State how long both programs take, as olp retime plans; --report and --review always do, unless "
+    "programs are long.",
 )
 @report_option()
 @click.option("--review", "review_file", metavar="review.html", help="Also write the page of olp view.")
@@ -155,9 +156,11 @@ def _review(
 ) -> Iterator[bytes]:
     """The page of --review, in parts."""
     from olp.review import job as review
+    from olp.workflows.correct_time import timed
 
     name = "" if outputs.output == STREAM else outputs.output
-    viewed = options_of(review.ViewOptions, asdict(options))
+    time = timed(result.report["moves"]["total"], asked=options.times)
+    viewed = options_of(review.ViewOptions, asdict(options) | {"time": time})
     return review.run(
         call.session, call.source, viewed, correction=result, corrected_name=name, progress=show
     ).parts()

@@ -186,8 +186,10 @@ def correct(program: str | None, machine: str | None, job: str | None, words: di
     written |= {Path(file): filed(result.report, file, words["date"]) for file in files_of(report_file)}
     if review_file is not None:
         from olp.review.joints import page_of
+        from olp.workflows.correct_time import timed
 
-        written[Path(review_file)] = page_of(run, done, options, output, time=True).parts()
+        time = timed(len(done.nominal), asked=options.times)
+        written[Path(review_file)] = page_of(run, done, options, output, time=time).parts()
     write_files(written, force=words["force"], inputs=run.files)
     if output == STREAM:
         put(result.data)

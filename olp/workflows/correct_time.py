@@ -31,6 +31,11 @@ class Both(Protocol):
     def report(self) -> dict[str, Any]: ...
 
 
+def timed(moves: int, *, asked: bool) -> bool:
+    """Whether the motion of a program of so many moves is planned, in a report and on a page."""
+    return asked or moves <= MOST_UNASKED
+
+
 def with_time(
     session: Session, program: Source, result: Both, options: UnrollOptions, tell: Progress | None,
     *, asked: bool = False,
@@ -41,17 +46,19 @@ def with_time(
 
 
 def state(
-    report: dict[str, Any], moves: int, timed: Callable[[], dict[str, Any]], *, asked: bool = False
+    report: dict[str, Any], moves: int, plan: Callable[[], dict[str, Any]], *, asked: bool = False
 ) -> None:
     """State times in the report of a program of so many moves, or why they are not known: those of long
     programs are not, unless they are there or a call has `asked` for them."""
-    if "time" not in report and moves > MOST_UNASKED and not asked:
-        report["time"] = {"unknown": LONG}
-    elif "time" not in report:
+    if "time" in report:
+        return
+    if timed(moves, asked=asked):
         try:
-            report["time"] = timed()
+            report["time"] = plan()
         except OlpError as error:
             report["time"] = {"unknown": str(error)}
+    else:
+        report["time"] = {"unknown": LONG}
 
 
 def cost(nominal_s: float, corrected_s: float, optimised: bool) -> dict[str, Any]:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from cases.acceptance import TRUE_ZERO, machine
 from click.testing import CliRunner, Result
+from judge.unpacker import Page
 
 import olp
 from olp.cli import main
@@ -176,10 +177,13 @@ def test_a_long_program_is_planned_more_simply_and_one_without_limits_says_why(
     assert not time["optimised"] and abs(time["share"]) <= 0.01
     assert "planned without optimised speeds" in result.stdout
     monkeypatch.setattr("olp.workflows.correct_time.MOST_UNASKED", 3)
-    run(*words)
+    page = tmp_path / "r.html"
+    run(*words, "--review", page)
     assert "--times" in json.loads((tmp_path / "r.json").read_text())["time"]["unknown"]
-    run(*words, "--times")
+    assert Page(page.read_bytes()).manifest["time_source"] == "feed"
+    run(*words, "--times", "--review", page)
     assert "share" in json.loads((tmp_path / "r.json").read_text())["time"]
+    assert Page(page.read_bytes()).manifest["time_source"] == "retimed"
     monkeypatch.undo()
     file = job.with_name("machine.toml")
     file.write_text(
