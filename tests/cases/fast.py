@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable
+from itertools import count
 from typing import Any, TypeVar
 
 import pytest
@@ -10,9 +11,16 @@ import pytest
 Case = TypeVar("Case")
 
 
-def some_fast(cases: Iterable[Any], each: int) -> list[Any]:
-    """The cases, all but one in `each` marked as slow; a tuple is the values of several names."""
-    return _others_marked(cases, each, pytest.mark.slow)
+def some_fast(cases: Iterable[Any], each: int, of_slow: int = 1) -> list[Any]:
+    """The cases, all but one in `each` marked as slow; a tuple is the values of several names. Of the slow
+    ones all but one in `of_slow` are left to a campaign before a release."""
+    marked, slow = _others_marked(cases, each, pytest.mark.slow), count()
+    return [
+        pytest.param(*case.values, marks=pytest.mark.campaign)
+        if case.marks and next(slow) % of_slow
+        else case
+        for case in marked
+    ]
 
 
 def some_of_a_campaign(cases: Iterable[Any], each: int) -> list[Any]:

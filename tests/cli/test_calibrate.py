@@ -71,8 +71,12 @@ def test_pages_of_all_lines(tmp_path: Path) -> None:
     good("evaluate", LINES, "--report", tmp_path / "r.html")
     # positioning, straightness and angles of three axes; three pairs; reversal
     assert_page(tmp_path / "r.html", 13)
-    good("fit", LINES, "-m", LINES / "machine.toml", "--report", tmp_path / "f.html", "-q")
-    assert_page(tmp_path / "f.html", 16)
+    page, target = tmp_path / "f.html", tmp_path / "calibration.toml"
+    good("fit", LINES, "-m", LINES / "machine.toml", "-o", target, "--report", page, "-q")
+    assert_page(page, 16)
+    assert target.is_file()
+    for words in ("Errors found", "OLP802", "Datum", "half reversal", "EXX", "standard uncertainty"):
+        assert words in page.read_text("utf-8")
 
 
 def test_evaluate_as_json_and_markdown(tmp_path: Path) -> None:
@@ -258,16 +262,6 @@ def test_squareness_in_all_conventions() -> None:
     framed = json.loads(good("squareness", "--drawn-frame", "C0Y=140.4,142.8,99.8", "--json"))
     assert framed["conventions"][3]["C0Y_urad"] == pytest.approx(-16950.7368, abs=1e-3)
     assert call("squareness", "C0Y").exit_code == 2
-
-
-@pytest.mark.slow
-def test_report_of_a_fit(tmp_path: Path) -> None:
-    page, target = tmp_path / "fit.md", tmp_path / "calibration.toml"
-    good("fit", LINES, "-m", LINES / "machine.toml", "-o", target, "--report", page, "-q")
-    text = page.read_text("utf-8")
-    assert target.is_file()
-    for words in ("Errors found", "OLP802", "Datum", "half reversal", "EXX", "standard uncertainty"):
-        assert words in text
 
 
 @pytest.mark.slow

@@ -321,9 +321,11 @@ FORMS = {".html": b"<!DOCTYPE html>", ".md": b"# ", ".json": b"{"}
 @pytest.mark.parametrize("verb", ["correct", "compare"])
 def test_reports_in_three_forms(verb: str, ending: str, tmp_path: Path) -> None:
     report = tmp_path / f"r{ending}"
+    # its motion is planned for the report
+    program = PROGRAM if verb == "compare" else PROGRAM.with_name("modal.ngc")
     words: list[object] = [
         "correct",
-        PROGRAM,
+        program,
         "-m",
         MACHINE,
         "-q",

@@ -99,8 +99,8 @@ def test_the_reports_and_the_page_of_a_correction(
     monkeypatch.chdir(folder)
     program(folder, name)
     words = ("correct", name, "-j", "job.toml", "-o", "out.nc", "--force", "--fail-on", "never")
-    for report in ("r.html", "r.md", "r.json"):
-        result = run(*words, "--report", report, "--review", "page.html")
+    for report, more in (("r.html", ("--review", "page.html")), ("r.md", ()), ("r.json", ())):
+        result = run(*words, "--report", report, *more)
         assert result.exit_code == 0, result.stderr
     page = elements((folder / "r.html").read_bytes())
     assert not page.names & {"script", "img", "iframe", "object"} and not page.running

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -129,7 +130,7 @@ def test_parallel_passes_closer_than_the_deviation() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("order", ["forward", "backward"])
+@pytest.mark.parametrize("order", some_of_a_campaign(["forward", "backward"], 2))
 def test_passes_closer_than_the_coarsest_nodes(order: Literal["forward", "backward"]) -> None:
     """250 rows of a raster 2.4 mm apart, each of 12 nodes of the coarsest level."""
     rows = np.repeat(np.arange(250), 2) * 2.4

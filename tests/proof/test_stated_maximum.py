@@ -217,7 +217,7 @@ def test_the_stated_maximum_is_what_the_whole_cut_is_off(tmp_path: Path, seed: i
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", some_of_a_campaign(SEEDS, 3))
 def test_each_line_of_an_uncorrected_program_is_what_it_is_off(tmp_path: Path, seed: int) -> None:
     """The nominal program as its own correction: every line is off, and each of them counts."""
     job = draw(seed, tmp_path)
@@ -371,6 +371,6 @@ def check_change(seed: int, folder: Path) -> dict[str, Any]:
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", some_of_a_campaign(range(8), 2))
 def test_one_wrong_coordinate_is_a_figure_on_its_line(tmp_path: Path, seed: int) -> None:
     assert list(check_change(seed, tmp_path)) == ["0.004", "0.5", "5.0"]

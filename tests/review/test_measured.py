@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from judge.machines import Recipe, random_machine, zero_machine
 from judge.unpacker import Page
 
@@ -34,7 +35,9 @@ def csv(points: np.ndarray, frame: str = "G54") -> str:
     return "\n".join([f"# frame={frame}", "X_mm,Y_mm,Z_mm", *rows]) + "\n"
 
 
-@pytest.mark.parametrize("name", ["modal", "full-circle", "g91-steps", "helix-turns", "planes", "inch"])
+@pytest.mark.parametrize(
+    "name", some_of_a_campaign(["modal", "full-circle", "g91-steps", "helix-turns", "planes", "inch"], 3)
+)
 @pytest.mark.slow
 def test_what_simulate_writes_is_the_uncorrected_machine(name: str, tmp_path: Path) -> None:
     program, machine = NASTY / f"{name}.ngc", NASTY / "machine.toml"

@@ -19,7 +19,7 @@ from olp.review.motion import table
 ROOT = Path(__file__).resolve().parents[2]
 NASTY = ROOT / "programs" / "nasty"
 #: Motions that take long to plan.
-LONG = ("cycles", "g91-steps", "helix-turns")
+LONG = ("cycles", "g91-steps", "helix-turns", "work-offsets")
 PROGRAMS = ["modal", "full-circle", "g64", "g91-steps", "work-offsets", "cycles", "helix-turns", "g53-g28"]
 #: what a motion may leave the programmed path by where the program names no path tolerance
 BLEND_MM = 0.01

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases.fast import left_to_a_campaign
 from judge import browser
 from judge.machines import Recipe, random_machine
 from PIL import Image
@@ -105,7 +106,7 @@ def beside(picture: np.ndarray) -> np.ndarray:
     return picture[:, int(width / 2 + LEGEND[1] * height) + 2 :]
 
 
-@pytest.mark.parametrize("job", ["small", "large", "plate"])
+@pytest.mark.parametrize("job", left_to_a_campaign(("small", "large", "plate"), ("plate",)))
 @pytest.mark.parametrize(("name", "family"), [("corrected", "blue"), ("uncorrected", "red")])
 def test_a_job_of_any_size_fills_the_static_page_in_the_colours_of_its_error(
     chromium: Any, server: Any, tmp_path: Path, request: pytest.FixtureRequest, job: str, name: str,

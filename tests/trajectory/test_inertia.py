@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases.acceptance import TRUE_ZERO, machine
+from cases.fast import left_to_a_campaign
 from cases.trajectory import LIMITS, random_route, route
 from cli.test_retime import SQUARE, START, TOOLS, program, run
 from hypothesis import given, settings
@@ -123,7 +124,7 @@ def test_the_report_states_it_beside_the_rest(job: Path, tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("share", [0.9, 0.5, 0.2, 0.05])
+@pytest.mark.parametrize("share", left_to_a_campaign([0.9, 0.5, 0.2, 0.05], (0.2, 0.9)))
 def test_a_bound_holds_and_costs_no_more_than_it_must(share: float, job: Path, tmp_path: Path) -> None:
     path = job.with_name("machine.toml")
     free = olp.retime(program(tmp_path), path, job)

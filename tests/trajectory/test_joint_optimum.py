@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from cases.joint_optimum import best, case, corner, jog, planned
 from judge.joint_optimum import Case, Found, optimum
 
@@ -73,7 +74,9 @@ WORST = {"corner": 1.006, "jog": 1.007}
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "some", "sizes"),
-    [("corner", case(corner(90.0), 0.02), (8, 6)), ("jog", case(jog(), 0.005), (8, 6))],
+    some_of_a_campaign(
+        [("corner", case(corner(90.0), 0.02), (8, 6)), ("jog", case(jog(), 0.005), (8, 6))], 2
+    ),
 )
 def test_a_plan_is_no_slower_and_no_faster_than_the_optimum_allows(
     name: str, some: Case, sizes: tuple[int, int]

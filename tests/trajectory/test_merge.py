@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from cases.trajectory import route
 from hypothesis import given
 from hypothesis import strategies as st
@@ -61,7 +62,7 @@ def test_so_are_other_circles_both_ways(radius_mm: float, feed: float, tolerance
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("radius_mm", "feed"), [(3.0, 100.0), (12.0, 200.0)])
+@pytest.mark.parametrize(("radius_mm", "feed"), some_of_a_campaign([(3.0, 100.0), (12.0, 200.0)], 2))
 def test_circles_that_limits_slow_down_take_little_longer(radius_mm: float, feed: float) -> None:
     """They were 14 to 40 % slower: the acceleration leaves no room for a step beside the circle."""
     whole, jogged = (plan(route(circle(j, radius_mm), feed, 0.01), LIMITS).duration_s for j in (0.0, 0.005))

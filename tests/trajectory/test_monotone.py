@@ -46,7 +46,7 @@ def mixed(seed: int) -> Route:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", some_of_a_campaign(range(4), 2))
+@pytest.mark.parametrize("seed", some_of_a_campaign(range(4), 4))
 def test_less_freedom_is_no_gain(seed: int) -> None:
     own = mixed(seed)
     rng = np.random.default_rng(100 + seed)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases.fast import left_to_a_campaign
 from cases.trajectory import CASES, LIMITS, random_route, route
 from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
@@ -165,13 +166,11 @@ def test_random_routes_keep_the_laws(seed: int) -> None:
     laws_hold(given_route, limits)
 
 
-_LONG = {"gentle jerk", "feed changes in a curve", "collinear", "one axis slow", "slow feed", "circle"}
+_LONG = ("feed changes in a curve",)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow if name in _LONG else ()) for name in sorted(CASES)]
-)
+@pytest.mark.parametrize("name", left_to_a_campaign(sorted(CASES), _LONG))
 def test_adversarial_routes_keep_the_laws(name: str) -> None:
     laws_hold(*CASES[name]())
 

@@ -124,7 +124,7 @@ def limits_of(draw):
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=150)
 @given(routes(), limits_of())
 def test_any_route(route, limits):
     check(route, limits)

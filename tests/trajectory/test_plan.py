@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -58,10 +59,10 @@ def assert_within(trajectory: Trajectory, limits: AxisLimits, feed: float = np.i
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
-    count=st.integers(2, 40),
+    count=st.integers(2, 20),
     scale=st.sampled_from([1e-3, 0.05, 1.0, 50.0]),
     pace=st.sampled_from([1.0, 30.0, 200.0, np.inf]),
     tolerance=st.sampled_from([0.0, 1e-3, 0.02, 1.0]),
@@ -200,7 +201,7 @@ def test_what_is_not_finite_is_refused(what: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("job", JOBS)
+@pytest.mark.parametrize("job", some_of_a_campaign(JOBS, 2))
 def test_shipped_jobs(job: str) -> None:
     folder = PROGRAMS / job
     stated = olp.load_setup(folder / "machine.toml", folder / "job.toml").job

@@ -6,7 +6,7 @@ import socket
 
 import numpy as np
 import pytest
-from cases.fast import some_fast
+from cases.fast import some_of_a_campaign
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -127,7 +127,7 @@ class Refuses(ruckig_moves.ruckig.Ruckig):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("broken", some_fast([Raises, LoopsBack, Refuses], 3))
+@pytest.mark.parametrize("broken", some_of_a_campaign([Raises, LoopsBack, Refuses], 3))
 @settings(deadline=None, max_examples=50)
 @given(case=moves())
 def test_a_broken_ruckig_is_replaced(broken, case):

@@ -10,6 +10,7 @@ import pytest
 from cases.any_judged import LIST, judged
 from cases.any_machines import KINDS, write_machine
 from cases.any_programs import waypoints
+from cases.fast import left_to_a_campaign
 from judge.whole_machine import WholeMachine
 
 from olp.files.kinematics.load import load_joint_setup
@@ -58,7 +59,7 @@ SINGULAR = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "seed", "form", "what"), SINGULAR)
+@pytest.mark.parametrize(("kind", "seed", "form", "what"), left_to_a_campaign(SINGULAR, SINGULAR[:2]))
 def test_near_singular_postures_the_tip_is_met_and_what_is_left_is_said(
     kind: str, seed: int, form: str, what: str
 ) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from judge.arm import Arm, between
 from judge.arm_files import ZEROS, arm_files
 from judge.robot_moves import READERS
@@ -21,7 +22,7 @@ PARTS = np.linspace(0.0, 1.0, 9)[1:]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("language", ["rapid", "val3"])
+@pytest.mark.parametrize("language", some_of_a_campaign(["rapid", "val3"], 2))
 def test_the_tip_is_right_where_every_joint_has_play(language: str, tmp_path: Path) -> None:
     """At the ends of moves, from the text; a reader finds the joints, and each lags by half of its play."""
     machine, steps = stated(arm_files(tmp_path), language), steps_of(0, "JLLPLJLL")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -42,7 +43,7 @@ def random_points(seed: int, n: int = 200) -> tuple[np.ndarray, np.ndarray]:
 # -- what tables are made of ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("chain", CHAINS)
+@pytest.mark.parametrize("chain", some_of_a_campaign(CHAINS, 4))
 @pytest.mark.slow
 def test_lines_through_zero_make_the_same_errors(chain: str, tmp_path: Path) -> None:
     """The judge measures off the datum and on tables; moved to 0 the model is the same to first order."""

@@ -178,7 +178,7 @@ def test_an_arc_that_enters_backwards_is_written_as_the_path_of_the_tool(tmp_pat
     assert olp.verify(nominal, result.data, path).report["deviation"]["holds"]
 
 
-@pytest.mark.parametrize("form", ["contour", "path"])
+@pytest.mark.parametrize("form", some_of_a_campaign(["contour", "path"], 2))
 def test_the_tool_goes_where_it_should_along_an_arc_that_enters(tmp_path: Path, form: str) -> None:
     path = machines.random_machine(tmp_path, 3, WORN)
     off, taken = {}, 0

@@ -513,7 +513,7 @@ def test_shipped_jobs_raise_no_doubt(job: Path) -> None:
     assert doubts_of(olp.check(program, None, job, select=sorted(DOUBTS), date=date).findings) == []
 
 
-@pytest.mark.parametrize("seed", some_fast(range(100), 12))
+@pytest.mark.parametrize("seed", some_fast(range(100), 12, 3))
 def test_random_machines_raise_no_doubt(seed: int, tmp_path: Path) -> None:
     recipe = Recipe(
         chain=CHAINS[seed % 24], off_datum=seed % 2 == 1, cyclic=seed % 3 == 0,

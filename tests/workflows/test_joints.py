@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases.fast import some_fast
+from cases.fast import some_fast, some_of_a_campaign
 from cases.joint_machines import STRUCTURES, machine_file, program
 from click.testing import CliRunner
 from judge.five_axis import Judge
@@ -26,7 +26,7 @@ def corrected(folder: Path, text: bytes, chain: str = "C A Y F X Z", **words: ob
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("chain", "tips"), some_fast(CASES, 11))
+@pytest.mark.parametrize(("chain", "tips"), some_of_a_campaign(CASES, 3))
 def test_the_judge_finds_the_corrected_path_within_tolerance(chain: str, tips: bool, tmp_path: Path) -> None:
     machine = machine_file(tmp_path, chain, control="fanuc" if tips else "linuxcnc", seed=7)
     text = program(chain, seed=4, tips=tips)

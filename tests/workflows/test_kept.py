@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from cli.test_cli import run
 from judge import linuxcnc, machines
 
@@ -239,7 +240,7 @@ def same_way(text: bytes, kept: olp.Correction, machine: Path) -> None:
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", some_of_a_campaign(range(24), 3))
 def test_kept_and_unrolled_go_the_same_way(machine: Path, seed: int) -> None:
     text = drawn(seed).encode()
     try:
@@ -254,7 +255,7 @@ def test_kept_and_unrolled_go_the_same_way(machine: Path, seed: int) -> None:
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", some_of_a_campaign(range(12), 2))
 def test_calls_at_several_places_go_the_same_way(machine: Path, seed: int) -> None:
     text = in_places(seed).encode()
     kept = olp.correct(text, machine)

@@ -257,7 +257,7 @@ def world(pose: Pose) -> Pose:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("language", some_of_a_campaign(WRITERS, 3))
+@pytest.mark.parametrize("language", some_of_a_campaign(WRITERS, 6))
 def test_arcs_of_an_arm_are_led_as_the_program_says(language: str, tmp_path: Path) -> None:
     machine = arm_files(tmp_path)
     first = np.array([0.0, 20.0, 30.0, 5.0, 50.0, 10.0])

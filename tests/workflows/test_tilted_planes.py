@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import some_of_a_campaign
 from cases.joint_machines import machine_file
 from judge.tilted import TiltedJudge
 
@@ -147,7 +148,9 @@ def by_swivel(folder: Path, text: bytes, axis: str = "A") -> olp.JointCorrection
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("mode", "way", "axis"), [(57, 1, "A"), (27, -1, "A"), (54, 1, "C")])
+@pytest.mark.parametrize(
+    ("mode", "way", "axis"), some_of_a_campaign([(57, 1, "A"), (27, -1, "A"), (54, 1, "C")], 3)
+)
 def test_swivelled_planes_are_corrected_as_the_judge_finds(
     mode: int, way: int, axis: str, tmp_path: Path
 ) -> None:

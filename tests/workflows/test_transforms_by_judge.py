@@ -75,7 +75,7 @@ def axes(cut: iso_frames.Cut) -> np.ndarray:
     return points + OFFSET
 
 
-@pytest.mark.parametrize("seed", some_fast(range(6), 6))
+@pytest.mark.parametrize("seed", some_fast(range(6), 6, 2))
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_tip_goes_where_the_program_says(tmp_path: Path, kind: str, seed: int) -> None:
     on, off, control, scale, unit = KINDS[kind]

@@ -93,7 +93,7 @@ def coverage(name: str, kind: str, runs: int, count: int = 60) -> tuple[float, f
     some_of_a_campaign([
         ("gantry_wrist", "lengths", 15), ("xyzac_trunnion", "points", 15), ("tripod", "points", 25),
         ("arm_6r_kr6", "points", 12), ("polar_rppr", "lengths", 15),
-    ], 3),
+    ], 5),
 )  # fmt: skip
 def test_the_fit_is_as_good_as_the_readings_allow(name: str, kind: str, runs: int) -> None:
     """The covariance of a linear Gaussian fit is the information limit: errors are within 1.15 of it. There

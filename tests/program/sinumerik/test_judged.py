@@ -147,7 +147,7 @@ def same_poses(data: bytes, path: Path) -> None:
     assert own.end_mm[kept] == pytest.approx(other[mine], abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", some_fast(range(24), 6))
+@pytest.mark.parametrize("seed", some_fast(range(24), 6, 3))
 def test_random_jobs_follow_their_path(bent: Path, seed: int) -> None:
     data = Job(seed, holes=False).text
     same_poses(data, bent)
@@ -159,7 +159,7 @@ def test_random_jobs_follow_their_path(bent: Path, seed: int) -> None:
     assert errors.max_um <= ALLOWED_UM
 
 
-@pytest.mark.parametrize("seed", some_fast(range(100, 124), 12))
+@pytest.mark.parametrize("seed", some_fast(range(100, 124), 12, 3))
 def test_jobs_with_holes_are_read_alike(bent: Path, seed: int) -> None:
     data = Job(seed, holes=True).text
     same_poses(data, bent)
