@@ -489,9 +489,8 @@ class JobFile(Table):
     )
     parameters: dict[Text, float] = Field(
         default={},
-        description="the table [parameters]: values that parameters of the program have in the control, such "
-        'as "#100" = 5.0, "#<depth>" = 2.5, Q13 = 1.0, R1 = 3.0, _DEPTH = 2.0 or VC1 = 4.0, wherever '
-        "the program does not set them",
+        description="the table [parameters]: values of parameters that the program does not set, such "
+        'as "#100" = 5.0, "#<depth>" = 2.5, Q13 = 1.0, R1 = 3.0, _DEPTH = 2.0 or VC1 = 4.0',
     )
     block_delete: Literal["on", "off"] | None = Field(
         default=None,
