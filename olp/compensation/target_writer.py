@@ -36,12 +36,13 @@ _NOT_STATED = np.uint8(Flag.CONTROL)
 @dataclass(slots=True, eq=False)
 class _Wanted:
     """What rows want of their targets: (r, 3) numbers before rounding (`value`), `decimals` and `mantissa`.
-    `stated` (r,) rows have a target."""
+    `stated` (r,) rows have a target, and `right` (r, 3) are its numbers that stay as they are written."""
 
     value: Array
     decimals: Index
     mantissa: Index
     stated: Mask
+    right: Mask
 
 
 class TargetWriter(PointWriter):
@@ -93,7 +94,12 @@ class TargetWriter(PointWriter):
         rows.emitted[:] = np.where(
             stated[:, None], self.placed(mantissa / POW10[decimals], self.path.frame[move]), np.nan
         )
-        return _Wanted(local, decimals, mantissa.astype(np.int64), stated)
+        at = np.flatnonzero(stated)
+        point = np.full(local.shape, np.nan)
+        points = [self.stated.targets[self._use(rows, row).target].point for row in at.tolist()]
+        point[at] = np.array(points).reshape(-1, 3)
+        right: Mask = np.rint(point * POW10[decimals]) == mantissa
+        return _Wanted(local, decimals, mantissa.astype(np.int64), stated, right)
 
     # -- targets -------------------------------------------------------------------------------------
 
@@ -108,15 +114,17 @@ class TargetWriter(PointWriter):
             groups = self._groups(rows, own, wanted)
             for k, group in enumerate(groups):
                 first = k == 0 and not target.held
-                kept = target.held and self._kept(target, group[0], wanted)
+                right = bool(wanted.right[group[0]].all())
+                kept = target.held and right
                 # the shift of a move is its own, and takes up what the target does not
                 shifted = [row for row in group if not (first or kept) and self._use(rows, row).offsets]
                 for row in shifted:
                     base = None if target.held else groups[0][0]
                     edits += self._shifted(rows, row, target, base, wanted)
                 fixed = [row for row in group if first or kept or not self._use(rows, row).offsets]
-                for row in fixed:
-                    rows.emitted[row] = self._reached(rows, row, target, group[0], wanted)
+                # with numbers of its own a row ends where they say
+                for row in fixed if right else [row for row in fixed if row != group[0]]:
+                    rows.emitted[row] = self._reached(rows, row, group[0], wanted)
                 if first:
                     edits += self._renumbered(target, group[0], wanted)
                 elif fixed and not kept:
@@ -131,7 +139,7 @@ class TargetWriter(PointWriter):
         use, move = self._use(rows, row), int(rows.move[row])
         decimals = int(wanted.decimals[row].max())
         base = np.array(target.point)
-        if first is not None and not self._kept(target, first, wanted):
+        if first is not None and not wanted.right[first].all():
             base = wanted.mantissa[first] / POW10[wanted.decimals[first]]
         turn, shift = matrix(use.offset_turn), np.array(use.shift_mm) / self.frame_of(move).unit_mm
         new = np.round(turn.T @ (shift + wanted.value[row] - base), decimals)
@@ -147,6 +155,8 @@ class TargetWriter(PointWriter):
     def _groups(self, all_: Rows, rows: list[int], wanted: _Wanted) -> list[list[int]]:
         """Rows that want the same of a target: first those that have no shift of their own, the largest group
         before others."""
+        if len(rows) == 1:
+            return [rows]
         groups: list[list[int]] = []
         known: dict[tuple[int, ...], list[int]] = {}
         for row in rows:
@@ -167,14 +177,9 @@ class TargetWriter(PointWriter):
         away = np.abs(wanted.value[row] * POW10[wanted.decimals[first]] - wanted.mantissa[first])
         return bool((away <= _RIGHT).all())
 
-    def _kept(self, target: Target, row: int, wanted: _Wanted) -> bool:
-        """Whether the numbers of a target are right to their last digit as they are written."""
-        own = np.rint(np.array(target.point) * POW10[wanted.decimals[row]])
-        return bool((own == wanted.mantissa[row]).all())
-
-    def _reached(self, rows: Rows, row: int, target: Target, first: int, wanted: _Wanted) -> Array:
-        """Where a row ends with the numbers that row `first` gives to the target."""
-        if self._kept(target, first, wanted):
+    def _reached(self, rows: Rows, row: int, first: int, wanted: _Wanted) -> Array:
+        """Where a row ends with the numbers that row `first` gives to its target."""
+        if wanted.right[first].all():
             return np.asarray(self.path.end_mm[rows.move[row]])
         number = wanted.mantissa[first] / POW10[wanted.decimals[first]]
         frame = self.path.frame[rows.move[row : row + 1]]
@@ -182,7 +187,7 @@ class TargetWriter(PointWriter):
 
     def _renumbered(self, target: Target, row: int, wanted: _Wanted) -> list[Replacement]:
         """New numbers in place of those of a target, where they differ."""
-        texts = self._numbers(target, row, wanted, target.point)
+        texts = self._numbers(target, row, wanted)
         edits = [
             (a, b, text)
             for (a, b), text in zip(target.numbers, texts, strict=True)
@@ -194,7 +199,7 @@ class TargetWriter(PointWriter):
     def _cloned(self, rows: Rows, target: Target, group: list[int], wanted: _Wanted) -> list[Replacement]:
         """A declaration of its own for the moves of a group, which name it."""
         data, first = self.program.data, target.value[0]
-        texts = self._numbers(target, group[0], wanted, target.point)
+        texts = self._numbers(target, group[0], wanted)
         numbers = [(a - first, b - first, text) for (a, b), text in zip(target.numbers, texts, strict=True)]
         name = self._new_name(target)
         text = spliced(data[slice(*target.value)], numbers)
@@ -294,18 +299,13 @@ class TargetWriter(PointWriter):
         assert use is not None
         return use
 
-    def _numbers(
-        self, target: Target, row: int, wanted: _Wanted, own: tuple[float, float, float]
-    ) -> list[bytes]:
-        """The three numbers that a row gives to a target; those that are right keep their bytes."""
-        texts = []
-        for k, (a, b) in enumerate(target.numbers):
-            decimals, mantissa = int(wanted.decimals[row, k]), int(wanted.mantissa[row, k])
-            if int(np.rint(own[k] * POW10[decimals])) == mantissa:
-                texts.append(self.program.data[a:b])
-            else:
-                texts.append(self._number((a, b), mantissa / 10.0**decimals, decimals))
-        return texts
+    def _numbers(self, target: Target, row: int, wanted: _Wanted) -> list[bytes]:
+        """The three numbers that a row gives to its target; those that are right keep their bytes."""
+        own = (column[row].tolist() for column in (wanted.right, wanted.mantissa, wanted.decimals))
+        return [
+            self.program.data[a:b] if right else self._number((a, b), mantissa / 10.0**decimals, decimals)
+            for (a, b), right, mantissa, decimals in zip(target.numbers, *own, strict=True)
+        ]
 
     def _number(self, span: tuple[int, int], value: float, decimals: int) -> bytes:
         """A value in the form of a number of the text, never with an exponent."""

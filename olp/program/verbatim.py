@@ -58,10 +58,20 @@ class Moves:
         self.number_count += len(spans)
         return self.number_count - len(spans)
 
-    def put(self, **move: Any) -> None:
+    def put(
+        self, *, kind: int, flag: int, line: int, frame: int, end: Sequence[float], slot: Sequence[int],
+        bounds: tuple[int, int], feed: float,
+    ) -> None:  # fmt: skip
         """One move."""
-        for name, value in move.items():
-            self.lists[name].append(value)
+        lists = self.lists
+        lists["kind"].append(kind)
+        lists["flag"].append(flag)
+        lists["line"].append(line)
+        lists["frame"].append(frame)
+        lists["end"].append(end)
+        lists["slot"].append(slot)
+        lists["bounds"].append(bounds)
+        lists["feed"].append(feed)
 
     def put_all(self, **moves: npt.ArrayLike) -> None:
         """Many moves; with `spans` their numbers, whose slots continue from `number_count`."""

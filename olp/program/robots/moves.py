@@ -40,8 +40,9 @@ _SAME_VECTOR_MM = 1e-4
 _SAME_ORIENTATION = 1e-3
 #: Statements between two reports of progress.
 _TOLD = 4096
-#: Nothing is said of a move.
-_PLAIN = Flag(0)
+#: Kinds and flags as the columns of moves have them.
+_LINE, _RAPID = int(Kind.LINE), int(Kind.RAPID)
+_WHOLE, _CONTROL = int(Flag.WHOLE), int(Flag.CONTROL)
 _NOWHERE: Vector = (NAN, NAN, NAN)
 _WORDS = pattern(rb"[A-Za-z_]\w*")
 _BEGINS_IN_RUN = "where this move begins depends on the run: it is corrected at its end"
@@ -163,11 +164,9 @@ class RobotMoves:
             self.remark("told", line, _BEGINS_IN_RUN)
         line_kind = known and not swings
         held = not chord and (whole or (line_kind and target.rest != self._rest))
-        flag = Flag.WHOLE if held else _PLAIN
-        kind = Kind.LINE if line_kind else Kind.RAPID
         self.moves.put(
-            kind=int(kind), flag=int(flag), line=line, frame=index, end=target.point,
-            slot=target.slots, bounds=use.statement, feed=feed,
+            kind=_LINE if line_kind else _RAPID, flag=_WHOLE if held else 0, line=line, frame=index,
+            end=target.point, slot=target.slots, bounds=use.statement, feed=feed,
         )  # fmt: skip
         first = self._first_turns.setdefault(tool.name, use.turn)
         if tool.pose is None and first != use.turn and not self.arm:
@@ -285,7 +284,7 @@ class RobotMoves:
             self.remark("told", line, _BEGINS_IN_RUN)
         self._frame = self._flange(line)
         self.moves.put(
-            kind=int(Kind.LINE if known else Kind.RAPID), flag=int(_PLAIN if known else Flag.CONTROL),
+            kind=_LINE if known else _RAPID, flag=0 if known else _CONTROL,
             line=line, frame=self._frame, end=_NOWHERE, slot=(-1, -1, -1), bounds=NOWHERE,
             feed=feed if known else self._feed,
         )  # fmt: skip
@@ -344,7 +343,7 @@ class RobotMoves:
     def _open(self, line: int, frame: int) -> None:
         """A move whose end is not stated."""
         self.moves.put(
-            kind=int(Kind.RAPID), flag=int(Flag.CONTROL), line=line, frame=frame, end=_NOWHERE,
+            kind=_RAPID, flag=_CONTROL, line=line, frame=frame, end=_NOWHERE,
             slot=(-1, -1, -1), bounds=NOWHERE, feed=self._feed,
         )  # fmt: skip
         self.uses.append(None)

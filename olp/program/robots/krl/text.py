@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import isnan
 
 from olp.core.patterns import pattern
 from olp.core.spool import Text
@@ -65,7 +64,8 @@ class Aggregate:
 
     def outer(self, absent: float) -> tuple[float, ...]:
         """The values of the external axes; `absent` is that of one which is not stated, and stays."""
-        return tuple([absent if isnan(value) else value for value in self.numbers[OUTER]])
+        # NaN alone differs from itself
+        return tuple([value if value == value else absent for value in self.numbers[OUTER]])
 
 
 def lines(data: bytes) -> Iterator[Line]:
