@@ -229,8 +229,7 @@ class Settled:
         if not found:
             raise _refused(
                 "no posture that reaches this target within the travel of the axes is the one that its "
-                "configuration names; check that configuration. Where others are refused, too, check the "
-                "axes and the place of the base in the machine file",
+                "configuration names; check that, or the axes and base of the machine",
                 line,
             )
         raise _refused("the configuration of this target names several postures", line)
