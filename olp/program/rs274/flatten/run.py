@@ -359,7 +359,7 @@ class Walk(Tasks):
         raise ProgramError(why, code="OLP544")
 
     def _set_again(self, arguments: dict[int, float | None]) -> dict[int, float | None] | None:
-        """The arguments that repetitions of a macro may have again, None where each has what the last left."""
+        """Arguments that repetitions of a macro may have again, None where each has what the last left."""
         return None if self.language.repeats_keep_locals else dict(arguments)
 
     def _macro(self, line: Line, frame: Frame, *, modal: bool) -> None:

@@ -325,6 +325,9 @@ def test_a_macro_may_be_called_more_than_once_with_its_own_variables() -> None:
         "OLP541", "#1 was changed by the last call of this macro, and whether the next call has its argument "
         "again is not known; assign it in the macro first",
     )  # fmt: skip
+    modal = source.replace("G65", "G66").replace("M30", "Y1.\nG67\nM30")
+    assert refused(modal, "fanuc")[0] == "OLP541"
+    assert flatten(modal.encode(), profile="haas") == b"O1\nY1.\nX1.\nX2.\nM30\n"
     assert fanuc(source.replace("#1=#1+1", "#2=9.")) == "O1\nX1.\nX1.\nM30\n"
     assert fanuc("O1\nG65 P2 A1. L2\nM30\nO2\n#2=#1\nX#2\n#2=5\nM99\n") == "O1\nX1.\nX1.\nM30\n"
 
