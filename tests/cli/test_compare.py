@@ -131,10 +131,10 @@ def test_frame_not_determined(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_order_of_points(nominal: Path) -> None:
-    _, report = compared(nominal, bent(2000)[::-1])
+    _, report = compared(nominal, bent(700)[::-1])
     assert codes(report) == {"OLP606"}
     assert report["frame"]["order"] == ["backward"]
-    shuffled = RNG.permutation(bent(2000))
+    shuffled = RNG.permutation(bent(700))
     assert codes(compared(nominal, shuffled)[1]) == {"OLP606"}
     assert codes(compared(nominal, shuffled, "--order", "forward")[1]) >= {"OLP601"}
 
@@ -155,7 +155,7 @@ def test_cycles_and_tolerance(nominal: Path, tmp_path: Path) -> None:
     files = []
     for i in range(10):
         files.append(tmp_path / f"run{i}.csv")
-        files[-1].write_text(table(bent(1500) + np.array((0, 0, 0.001 * i))))
+        files[-1].write_text(table(bent(600) + np.array((0, 0, 0.001 * i))))
     few = json.loads(run("compare", nominal, *files[:3], "--json").stdout)
     assert codes(few) == {"OLP607"}
     # z = 0, 1, 2 um: barycentre 1 um, distances 1, 0, 1 um

@@ -71,6 +71,11 @@ def simulated(job: Job, program: Path, name: str, off_um: float = 0.0) -> Path:
 def heard(job: Job, *, plots: bool = False) -> None:
     """All consumers of a job, also of two measured runs of it."""
     _, out = predicted(job, plots=plots)
+    heard_of_runs(job, out, plots=plots)
+
+
+def heard_of_runs(job: Job, out: Path, *, plots: bool = False) -> None:
+    """All consumers of two measured runs of a corrected program."""
     files = [simulated(job, out, "first.csv"), simulated(job, out, "second.csv", 7.0)]
     measured(job, out, files, 5.0, plots=plots)
     measured_briefly(job, out, files[:1], None)
@@ -207,8 +212,14 @@ def test_a_planted_contradiction_is_found(name: str, tmp_path: Path, monkeypatch
         monkeypatch.setitem(formats, key, plant(formats[key]))
     else:
         monkeypatch.setattr(where, plant(pkgutil.resolve_name(where)))
+    job, out = own_job(tmp_path, FEW), tmp_path / "out.ngc"
+    if name.startswith("compare"):
+        out.write_bytes(olp.correct(job.program, **job.api).data)
     with pytest.raises(AssertionError):
-        heard(own_job(tmp_path, FEW), plots=name == "plots")
+        if name.startswith("compare"):
+            heard_of_runs(job, out)
+        else:
+            heard(job, plots=name == "plots")
 
 
 # -- what counts -----------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from cli.test_cli import PROGRAMS, run
 from olp.reports import shown
 from olp.reports.document import Document, Grid, Notice, Pairs, Paragraph, Section, as_shown
 
-PLATE = ("correct", "-j", PROGRAMS / "gantry-plate" / "job.toml")
+PLATE = ("correct", "-j", PROGRAMS / "gantry-plate" / "job-bracket.toml")
 
 
 @pytest.mark.parametrize(
@@ -93,12 +93,12 @@ def figures(text: str, after: str) -> list[float]:
 
 @pytest.mark.slow
 def test_a_correction_in_inches_is_the_same_correction(tmp_path: Path) -> None:
-    out = ("-o", tmp_path / "out.ngc", "--force")
+    out = ("-o", tmp_path / "out.mpf", "--force")
     mm = run(*PLATE, *out, "--report", tmp_path / "mm.md")
-    data = (tmp_path / "out.ngc").read_bytes()
+    data = (tmp_path / "out.mpf").read_bytes()
     inch = run(*PLATE, *out, "--units", "inch", "--report", tmp_path / "inch.md")
     assert (mm.exit_code, inch.exit_code) == (0, 0)
-    assert (tmp_path / "out.ngc").read_bytes() == data
+    assert (tmp_path / "out.mpf").read_bytes() == data
     before, now = figures(mm.stdout, "Deviation from"), figures(inch.stdout, "Deviation from")
     assert now == pytest.approx([um / 25400 for um in before], abs=1.1e-5)
     assert not re.search(r"\d um\b", inch.stdout.partition("Findings")[0])

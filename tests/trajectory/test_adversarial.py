@@ -90,7 +90,7 @@ OWN: dict[str, Callable[[], Case]] = {
     "tiny segments, rapids": lambda: (route(beside_ten_metres(1e-9, 1e-2), np.inf, 1e-4), LIMITS),
     "all points stops": lambda: (route(flat(), 100.0, 0.0), LIMITS),
     "tiny stops": lambda: (route(flat(1e-6), 100.0, 0.0), LIMITS),
-    "stops and blends": lambda: (with_tolerances(route(flat(count=20), 100.0, 0.0), 0.0, 0.02, 0.5), LIMITS),
+    "stops and blends": lambda: (with_tolerances(route(flat(count=12), 100.0, 0.0), 0.0, 0.02, 0.5), LIMITS),
     "fine beside coarse tolerance": lambda: (
         with_tolerances(route(flat(0.3), 100.0, 0.0), 1e-5, 5.0),
         LIMITS,
@@ -159,7 +159,7 @@ OWN: dict[str, Callable[[], Case]] = {
         route(ring(20, 2000), 200.0, 0.005),
         replace(LIMITS, jerk=np.full(3, 1e9)),
     ),
-    "acceleration of 1": lambda: (route(flat(5.0, 20), 100.0, 0.05), faster(acceleration=2e-4)),
+    "acceleration of 1": lambda: (route(flat(5.0, 10), 100.0, 0.05), faster(acceleration=2e-4)),
     "one axis 100 times slower": lambda: (route(flat(3.0), 100.0, 0.02), SLOW_Y),
     "a circle with one axis slow": lambda: (route(ring(20, 400), 100.0, 0.01), SLOW_Y),
     "along the slow axis and across": lambda: (
@@ -169,14 +169,14 @@ OWN: dict[str, Callable[[], Case]] = {
     "ten rounds": lambda: (route(ring(2, 60, 10), 100.0, 0.01), LIMITS),
     "a closed triangle": lambda: (route(ring(10, 3, 4), np.inf, 0.2), LIMITS),
     "a helix": lambda: (
-        route(ring(5, 80, 2) + np.linspace(0, 6, 161)[:, None] * [0, 0, 1], 150.0, 0.005),
+        route(ring(5, 60) + np.linspace(0, 3, 61)[:, None] * [0, 0, 1], 150.0, 0.005),
         LIMITS,
     ),
     "speed at the ceiling all along": lambda: (
         route(np.arange(200.0)[:, None] * [5.0, 0, 0], 500.0, 0.01),
         LIMITS,
     ),
-    "far from zero": lambda: (route(flat(0.5, 20) + 1e5, 100.0, 0.01), LIMITS),
+    "far from zero": lambda: (route(flat(0.5, 12) + 1e5, 100.0, 0.01), LIMITS),
     "dwells everywhere": lambda: (
         replace(route(flat(1.0, 12), 100.0, 0.01), dwell_s=np.resize([0.0, 0.25, 1e-4, 30.0], 13)),
         LIMITS,

@@ -237,7 +237,7 @@ def test_every_result_has_a_report_for_notebooks(tmp_path: Path) -> None:
     calibration = fitted.write(tmp_path / "calibration.toml")[0]
     diagnosis = olp.diagnose_calibration(calibration, lines / "tracker.csv", lines / "machine.toml")
     plan = olp.plan_measurements(lines / "machine.toml")
-    program, machine = PROGRAMS / "table-router/outline.ngc", PROGRAMS / "table-router/machine.toml"
+    program, machine = PROGRAMS / "nasty/modal.ngc", PROGRAMS / "nasty/machine.toml"
     timed = olp.retime(program, machine)
     measured = olp.simulate(program, machine).write(tmp_path / "run.csv")
     compared = olp.compare(program, [measured], machine)
