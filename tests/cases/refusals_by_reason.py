@@ -89,17 +89,17 @@ def outcomes(corpus: Path) -> list[Outcome]:
         with tempfile.TemporaryDirectory() as place:
             paths = sorted(p for p in (corpus / folder).iterdir() if p.is_file())
             called = {name.decode("latin-1") for path in paths for name in _NAMED.findall(path.read_bytes())}
-            where, job = machine(Path(place), control, sorted(called))
+            setup = olp.load_setup(*machine(Path(place), control, sorted(called)))
             for path in paths:
-                every.append(_outcome(path, where, job))
+                every.append(_outcome(path, setup))
     return every
 
 
-def _outcome(path: Path, where: Path, job: Path) -> Outcome:
+def _outcome(path: Path, setup: olp.Setup) -> Outcome:
     error: OlpError | None = None
     for flatten in (False, True):
         try:
-            olp.correct(path, where, job, flatten=flatten)
+            olp.correct(path, setup, flatten=flatten)
             return Outcome(path.parent.name, path.name)
         except OlpError as refusal:
             error = error or refusal

@@ -107,10 +107,10 @@ def everything(corpus: Path) -> list[Path]:
 @pytest.mark.parametrize("controller", FAMILY)
 def test_no_text_of_any_dialect_crashes(corpus: Path, tmp_path: Path, controller: str) -> None:
     """Robot languages and part descriptions under a G-code profile are refused, or stay unchanged."""
-    machine = machines.shift_machine(tmp_path, recipe=Recipe(controller=controller))
+    setup = olp.load_setup(machines.shift_machine(tmp_path, recipe=Recipe(controller=controller)))
     for path in everything(corpus)[FAMILY.index(controller) :: len(FAMILY)]:
         try:
-            olp.correct(path, machine)
+            olp.correct(path, setup)
         except OlpError as refusal:
             assert isinstance(refusal, OlpError)
             assert str(refusal)
