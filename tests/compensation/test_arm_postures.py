@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+import pytest
 from judge.arm import Arm
 from judge.arm_files import MACHINE
 
@@ -10,6 +14,10 @@ from olp.compensation.joints.arm_postures import Settled, Wanted, nearest
 from olp.files.kinematics.load import load_joint_machine
 from olp.kinematics.parallel_arm import arm_of
 from olp.kinematics.poses import Poses
+from olp.program.robots.inform import postures as inform
+from olp.program.robots.krl import postures as krl
+from olp.program.robots.ls import postures as ls
+from olp.program.robots.rapid import postures as rapid
 
 
 def test_a_series_of_straight_moves_goes_on_near_by() -> None:
@@ -50,3 +58,36 @@ def test_a_target_without_words_is_reached_near_by_where_other_postures_are_none
     )  # fmt: skip
     found = Settled(arm, wanted, postures, np.array([[-400.0] * 6, [400.0] * 6])).axes(goal + 1.0)
     assert np.abs(found[0] - goal).max() < 1e-7
+
+
+NO = [None, None, None]
+
+
+@pytest.mark.parametrize(
+    ("words", "before", "behind", "changed"),
+    [
+        # beyond the border by rounding: the word stays with the axis, and not where that goes on
+        (lambda a, b: rapid.turns((0, 0, 0, 0), a, b), -0.001, -0.001, NO),
+        (lambda a, b: rapid.turns((0, 0, 0, 0), a, b), -0.001, -0.1, [None, None, -1]),
+        (lambda a, b: rapid.turns((0, 0, 0, 0), a, b), 0.001, -0.001, [None, None, -1]),
+        (lambda a, b: krl.turns((2, 0), a, b), -0.001, -0.001, [None]),
+        (lambda a, b: krl.turns((2, 0), a, b), -0.001, -0.1, [32]),
+        (lambda a, b: krl.turns((2, 32), a, b), -0.001, 0.001, [0]),
+        (lambda a, b: ls.turns((1, 1, 1, 0, 0, 0), a, b), 180.001, 180.001, NO),
+        (lambda a, b: ls.turns((1, 1, 1, 0, 0, 0), a, b), 180.001, 180.1, [None, None, 1]),
+        (lambda a, b: ls.turns((1, 1, 1, 0, 0, 0), a, b), 179.999, 180.001, [None, None, 1]),
+        (lambda a, b: inform.turned((0, 0, 0, 0, 0, 0), a, b), 180.001, 180.001, None),
+        (lambda a, b: inform.turned((0, 0, 0, 0, 0, 0), a, b), 180.001, 180.1, (0, 0, 0, 0, 0, 1)),
+        (lambda a, b: inform.turned((0, 0, 0, 0, 0, 0), a, b), 179.999, 180.001, (0, 0, 0, 0, 0, 1)),
+    ],
+)
+def test_words_that_are_right_within_rounding_stay_with_the_axis(
+    words: Callable[[list[float], list[float]], Any], before: float, behind: float, changed: Any
+) -> None:
+    """An error of zero changes no byte of them."""
+    found = words(*([10.0, 20.0, 30.0, 40.0, 50.0, last] for last in (before, behind)))
+    if isinstance(changed, tuple):
+        assert found is not None
+        assert sum(found) == 1
+    else:
+        assert found == changed

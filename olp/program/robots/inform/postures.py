@@ -6,7 +6,7 @@ lower arm, the rear side, and which of axes R, T and S are more than half a turn
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -60,13 +60,19 @@ def turned(
         return None
     own = [int(word) for word in config]
     new = list(own)
-    r = 180.0 - (180.0 - nominal[_R]) % 360.0
-    if _unflipped(r) == own[0] or abs(abs(r) - 90.0) < _ROUNDING_DEG:
-        new[0] = _unflipped(180.0 - (180.0 - corrected[_R]) % 360.0)
+    r, there = (180.0 - (180.0 - values[_R]) % 360.0 for values in (nominal, corrected))
+    new[0] = _word(own[0], r, there, 90.0, _unflipped)
     for column, place in _TURNED:
-        if _beyond(nominal[column]) == own[place] or abs(abs(nominal[column]) - 180.0) < _ROUNDING_DEG:
-            new[place] = _beyond(corrected[column])
+        new[place] = _word(own[place], nominal[column], corrected[column], 180.0, _beyond)
     return None if new == own else tuple(new)
+
+
+def _word(own: int, before: float, behind: float, border: float, says: Callable[[float], int]) -> int:
+    """A word of an axis that goes from `before` to `behind`, deg. What is rounding in the text stays, where
+    the axis stays."""
+    told = says(before) == own or abs(abs(before) - border) < _ROUNDING_DEG
+    stays = says(behind) == says(before) and abs(abs(behind) - border) < _ROUNDING_DEG
+    return says(behind) if told and not stays else own
 
 
 def _unflipped(degrees: float) -> int:

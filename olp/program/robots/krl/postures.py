@@ -35,5 +35,9 @@ def turns(config: Sequence[float], nominal: Sequence[float], corrected: Sequence
     """As `RobotDialect.turns_of`. One that did not say where the axes are stays."""
     own = int(config[1])
     says = all((-value if own >> k & 1 else value) > -_ROUNDING_DEG for k, value in enumerate(nominal))
-    new = own & ~((1 << _AXES) - 1) | sum(1 << k for k, value in enumerate(corrected) if value < 0.0)
+    new = own & ~((1 << _AXES) - 1)
+    for k, (before, value) in enumerate(zip(nominal, corrected, strict=True)):
+        # what is rounding in the text stays, where the axis stays
+        stays = (value < 0.0) == (before < 0.0) and abs(value) < _ROUNDING_DEG
+        new |= own & 1 << k if stays else (value < 0.0) << k
     return [new if says and new != own else None]

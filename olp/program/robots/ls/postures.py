@@ -60,5 +60,8 @@ def turns(config: Sequence[float], nominal: Sequence[float], corrected: Sequence
         own = int(config[3 + place])
         says = abs(nominal[column] - 360.0 * own) <= 180.0 + _ROUNDING_DEG
         new = round(corrected[column] / 360.0)
-        found.append(new if says and new != own else None)
+        # what is rounding in the text stays, where the axis stays
+        stays = new == round(nominal[column] / 360.0)
+        stays &= abs(corrected[column] - 360.0 * own) <= 180.0 + _ROUNDING_DEG
+        found.append(new if says and new != own and not stays else None)
     return found

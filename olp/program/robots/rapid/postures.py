@@ -44,6 +44,9 @@ def turns(config: Sequence[float], nominal: Sequence[float], corrected: Sequence
         own, now = float(config[place]), float(nominal[column]) / _QUARTER_DEG
         rounding = _ROUNDING_DEG / _QUARTER_DEG
         says = own - rounding <= now <= own + 1.0 + rounding
-        new = floor(corrected[column] / _QUARTER_DEG)
-        found.append(new if says and new != own else None)
+        there = float(corrected[column]) / _QUARTER_DEG
+        new = floor(there)
+        # what is rounding in the text stays, where the axis stays
+        stays = new == floor(now) and own - rounding <= there <= own + 1.0 + rounding
+        found.append(new if says and new != own and not stays else None)
     return found
