@@ -9,7 +9,6 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from olp.core.parameters import NAMES
 from olp.core.patterns import pattern
 from olp.core.schema import Interval, NotNegative, Position, Positive, Table, Text, Triple
 from olp.core.schema_keys import Field, Known, refusal, rule
@@ -510,6 +509,8 @@ class JobFile(Table):
     @rule("parameters")
     @staticmethod
     def _named(value: dict[str, float], _: Known) -> dict[str, float]:
+        from olp.core.parameters import NAMES
+
         for name in value:
             if not NAMES.fullmatch(name):
                 raise refusal(f'has the key "{name}"; expected one such as "#100", "#<depth>" or "R1"')

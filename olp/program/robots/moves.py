@@ -40,9 +40,12 @@ _SAME_VECTOR_MM = 1e-4
 _SAME_ORIENTATION = 1e-3
 #: Statements between two reports of progress.
 _TOLD = 4096
-#: Kinds and flags as the columns of moves have them.
-_LINE, _RAPID = int(Kind.LINE), int(Kind.RAPID)
-_WHOLE, _CONTROL = int(Flag.WHOLE), int(Flag.CONTROL)
+#: Kinds as the columns of moves have them.
+_LINE = int(Kind.LINE)
+_RAPID = int(Kind.RAPID)
+#: The same of flags.
+_WHOLE = int(Flag.WHOLE)
+_CONTROL = int(Flag.CONTROL)
 _NOWHERE: Vector = (NAN, NAN, NAN)
 _WORDS = pattern(rb"[A-Za-z_]\w*")
 _BEGINS_IN_RUN = "where this move begins depends on the run: it is corrected at its end"

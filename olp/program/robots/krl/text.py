@@ -21,8 +21,13 @@ _COMPONENT = pattern(
 #: Components of positions in their order, and those of joints.
 _OF_POSES = ("X", "Y", "Z", "A", "B", "C", "S", "T", "E1", "E2", "E3", "E4", "E5", "E6")
 _OF_JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6", "", "", *_OF_POSES[8:])
-#: The places of six joints, or of a place and its angles; of status and turn; of external axes.
-SIX, STATUS, TURN, OUTER = slice(6), 6, 7, slice(8, 14)
+#: The places of six joints, or of a place and its angles.
+SIX = slice(6)
+#: Those of status and turn.
+STATUS = 6
+TURN = 7
+#: Those of external axes.
+OUTER = slice(8, 14)
 #: A position in the usual form, as taught points have it.
 _N = rb"([-+]?(?:\d+\.?\d*|\.\d+))"
 _USUAL = pattern(

@@ -16,7 +16,11 @@ from olp.program.rs274.flatten.state import ProgramState, Value
 from olp.program.rs274.flatten.unit import Frame
 from olp.program.rs274.flatten.written import number_text
 
-SAVE, DROP, RESTORE, SAVE_AND_RETURN = 70, 71, 72, 73
+#: M codes that save the modes, drop and restore those that are saved, and save them for one call.
+SAVE = 70
+DROP = 71
+RESTORE = 72
+SAVE_AND_RETURN = 73
 _CODES = frozenset({SAVE, DROP, RESTORE, SAVE_AND_RETURN})
 #: Further modes by what they are, and their G codes, ten times their number.
 _MODES = {
