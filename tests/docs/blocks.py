@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from olp.cli import main
 from olp.files import handbook
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,6 +35,8 @@ _PATH = re.compile(r"(?:[#;!] |<!-- |\()([\w./-]+\.\w+)(?: -->|\))?\n")
 _CONTINUES = "continues"
 #: Printed between two such blocks.
 _END = "-- the next block --"
+#: A call of `olp` in which no shell has anything to do.
+_PLAIN = re.compile(r"olp [^|<>$&;*?`\\]*")
 #: End of a command that is meant to fail.
 _EXITS = re.compile(r"\s+# exits with (\d)$")
 
@@ -105,8 +111,21 @@ def run(body: str, folder: Path, *, timeout_s: float = 300.0) -> tuple[int, str]
     return done.returncode, done.stdout
 
 
-def problems(parts: list[Block], folder: Path) -> Iterator[str]:
-    """Run all blocks of a page in a folder, one after the other; what goes wrong."""
+def called(command: str, folder: Path) -> tuple[int, str]:
+    """The same of one command. A call of `olp` is one of this process, so that two hundred of them do not
+    import everything anew."""
+    if not _PLAIN.fullmatch(command):
+        return run(command, folder)
+    with contextlib.chdir(folder):
+        result = CliRunner(env={"COLUMNS": "100"}).invoke(main, shlex.split(command)[1:])
+    assert result.exception is None or isinstance(result.exception, SystemExit), (command, result.exception)
+    return result.exit_code, result.output
+
+
+def problems(
+    parts: list[Block], folder: Path, call: Callable[[str, Path], tuple[int, str]] = run
+) -> Iterator[str]:
+    """Run all blocks of a page in a folder, one after the other, each command by `call`; what goes wrong."""
     for block in parts:
         if block.file is not None:
             target = folder / block.file
@@ -114,18 +133,18 @@ def problems(parts: list[Block], folder: Path) -> Iterator[str]:
             target.write_text(block.body, "utf-8")
     for number, block in enumerate(parts):
         if block.kind == "sh" and not block.set_up:
-            yield from _shell(block, folder)
+            yield from _shell(block, folder, call)
         elif block.kind == "python" and _CONTINUES not in block.mark:
             following = [b for b in parts[number + 1 :] if b.kind == "python"]
             going_on = itertools.takewhile(lambda b: _CONTINUES in b.mark, following)
             yield from _python([block, *going_on], folder)
 
 
-def _shell(block: Block, folder: Path) -> Iterator[str]:
+def _shell(block: Block, folder: Path, call: Callable[[str, Path], tuple[int, str]]) -> Iterator[str]:
     output = ""
     for command in block.body.splitlines():
         wanted = _EXITS.search(command)
-        code, text = run(_EXITS.sub("", command), folder)
+        code, text = call(_EXITS.sub("", command), folder)
         output += text
         if code != (int(wanted[1]) if wanted else 0):
             yield f"{block.page}: `{command}` exits with {code}: {text[-500:]}"
