@@ -38,3 +38,12 @@ class _Late:
 def pattern(text: AnyStr, flags: int = 0) -> re.Pattern[AnyStr]:
     """As `re.compile`; the pattern is compiled when it is first used."""
     return cast("re.Pattern[AnyStr]", _Late(text, flags))
+
+
+#: Numbered and named parameters of RS-274, those of Heidenhain, R-parameters, and variables of Okuma.
+#: Then names of Sinumerik variables, with the index of an element: of three letters and more, or with `_` or
+#: `$` in front, as shorter ones may be axes.
+PARAMETER_NAMES = pattern(
+    r"#(\d{1,5}|<[^<>]+>)|Q[LR]?\d{1,5}|R\d{1,5}|VC\d{1,3}"
+    r"|(?:\$[A-Z]|_|(?!AX\d)[A-Z][A-Z_]{2})[A-Z0-9_]*(?:\[\d+(?:,\d+)*\])?"
+)

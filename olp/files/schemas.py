@@ -9,7 +9,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from olp.core.patterns import pattern
+from olp.core.patterns import PARAMETER_NAMES, pattern
 from olp.core.schema import Interval, NotNegative, Position, Positive, Table, Text, Triple
 from olp.core.schema_keys import Field, Known, refusal, rule
 from olp.files.calibration.schema import CalibrationFile
@@ -488,8 +488,8 @@ class JobFile(Table):
     )
     parameters: dict[Text, float] = Field(
         default={},
-        description="the table [parameters]: values of parameters that the program does not set, such "
-        'as "#100" = 5.0, "#<depth>" = 2.5, Q13 = 1.0, R1 = 3.0, _DEPTH = 2.0 or VC1 = 4.0',
+        description="the table [parameters]: values that the program does not set, such as "
+        '"#100" = 5.0, "#<depth>" = 2.5, Q13 = 1.0, R1 = 3.0, _DEPTH = 2.0 or VC1 = 4.0',
     )
     block_delete: Literal["on", "off"] | None = Field(
         default=None,
@@ -509,10 +509,8 @@ class JobFile(Table):
     @rule("parameters")
     @staticmethod
     def _named(value: dict[str, float], _: Known) -> dict[str, float]:
-        from olp.core.parameters import NAMES
-
         for name in value:
-            if not NAMES.fullmatch(name):
+            if not PARAMETER_NAMES.fullmatch(name):
                 raise refusal(f'has the key "{name}"; expected one such as "#100", "#<depth>" or "R1"')
         return value
 

@@ -16,7 +16,6 @@ from olp.program.rs274.flatten.state import ProgramState, Value
 from olp.program.rs274.flatten.unit import Frame
 from olp.program.rs274.flatten.written import number_text
 
-#: M codes that save the modes, drop and restore those that are saved, and save them for one call.
 SAVE = 70
 DROP = 71
 RESTORE = 72

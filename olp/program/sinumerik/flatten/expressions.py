@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, MutableMapping
 from functools import lru_cache
 
 from olp.core.errors import ProgramError
-from olp.core.parameters import NAMES
+from olp.core.patterns import PARAMETER_NAMES
 
 Value = float | bool | str
 #: Names of variables by their capitals, an index in brackets among them.
@@ -193,7 +193,8 @@ class _Reading:
         if name in _NAMED:
             return _NAMED[name]
         if name not in self.variables:
-            stated = "give it in the table [parameters] of the job file, or " if NAMES.fullmatch(name) else ""
+            named = PARAMETER_NAMES.fullmatch(name)
+            stated = "give it in the table [parameters] of the job file, or " if named else ""
             raise ProgramError(
                 f"{name} has no value that the program sets; {stated}set it in the program", code="OLP541"
             )
