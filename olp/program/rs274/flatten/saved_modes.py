@@ -16,6 +16,7 @@ from olp.program.rs274.flatten.state import ProgramState, Value
 from olp.program.rs274.flatten.unit import Frame
 from olp.program.rs274.flatten.written import number_text
 
+#: M codes that save modes, drop and restore saved ones, and save them for one call.
 SAVE = 70
 DROP = 71
 RESTORE = 72
