@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from cases.acceptance import judged, points, unstamped
 from cases.dialects import BLOCKS, CASES, FRAMES, RS274, Case
-from cases.fast import some_fast
+from cases.fast import left_to_a_campaign
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from judge import linuxcnc, machines
@@ -37,6 +37,10 @@ LEVER = np.array([0.0, 0.0, -120.0])
 HALF_DIGIT = 0.5e-3 + SLACK_MM
 #: what the strictest control of them (grbl) takes as the difference of two radii of an arc
 RADIUS_MM = 0.005
+#: Profiles of RS-274 that others of them stand for where a law takes a second of each dialect.
+ALIKE = {*RS274} - {"linuxcnc", "fanuc", "grbl", "marlin"}
+#: Bytes of a specimen that takes long.
+LONG = 120_000
 
 
 def recipe(case: Case, **more: object) -> Recipe:
@@ -85,9 +89,9 @@ def test_every_registered_dialect_has_a_case() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", some_fast(CASES, 4))
+@pytest.mark.parametrize("name", left_to_a_campaign(CASES, ALIKE))
 @given(data=st.data())
-@settings(max_examples=40)
+@settings(max_examples=25)
 def test_l1_any_bytes_come_back_or_are_refused(
     zero: dict[str, Setup], shifted: dict[str, Setup], name: str, data: st.DataObject
 ) -> None:
@@ -107,10 +111,10 @@ def test_l1_chosen_texts(zero: dict[str, Setup], shifted: dict[str, Setup], name
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", some_fast(CASES, 4))
+@pytest.mark.parametrize("name", left_to_a_campaign(CASES, ALIKE))
 @given(noise=st.binary(max_size=60))
 @example(noise=b"$$ \xff 'x'")
-@settings(max_examples=15)
+@settings(max_examples=8)
 def test_l1_text_in_a_comment_is_opaque(zero: dict[str, Setup], name: str, noise: bytes) -> None:
     case = CASES[name]
     content = re.sub(rb"[\0\r\n()]|olp", b"", noise).rstrip(b" $\t\v\f").decode("latin-1")
@@ -120,12 +124,12 @@ def test_l1_text_in_a_comment_is_opaque(zero: dict[str, Setup], name: str, noise
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", some_fast(CASES, 4))
+@pytest.mark.parametrize("name", left_to_a_campaign(CASES, ALIKE))
 @given(
     seed=st.integers(0, 2**20),
     cuts=st.lists(st.tuples(st.integers(0, 4000), st.binary(max_size=4)), max_size=6),
 )
-@settings(max_examples=20)
+@settings(max_examples=12)
 def test_l1_a_damaged_program_never_crashes(
     zero: dict[str, Setup], shifted: dict[str, Setup], name: str, seed: int,
     cuts: list[tuple[int, bytes]],
@@ -150,8 +154,9 @@ def test_l3_no_error_no_edit(zero: dict[str, Setup], name: str, seed: int) -> No
 
 
 @pytest.mark.corpus
+@pytest.mark.parametrize("long", [False, pytest.param(True, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("name", [n for n, c in CASES.items() if c.specimens])
-def test_l1_l3_every_specimen_stays_unchanged(corpus: Path, tmp_path: Path, name: str) -> None:
+def test_l1_l3_every_specimen_stays_unchanged(corpus: Path, tmp_path: Path, name: str, long: bool) -> None:
     case = CASES[name]
     tools = {n: {"Z_mm": 100.0 + n} for n in range(1, 31)}
     frames = {**FRAMES, **{f"COOR_{n:04d}": FRAMES["A"] for n in range(1, 30)}}
@@ -163,9 +168,14 @@ def test_l1_l3_every_specimen_stays_unchanged(corpus: Path, tmp_path: Path, name
         described.read_text()
         + '[styli."A0.0B0.0"]\noffset_mm = [0, 0, -150]\n[styli."A90.0B0.0"]\noffset_mm = [0, 120, -50]\n'
     )
-    paths = [p for pattern in case.specimens for p in sorted(corpus.glob(pattern))]
+    paths = [
+        path
+        for pattern in case.specimens
+        for path in sorted(corpus.glob(pattern))
+        if path.stat().st_size < 400_000 and (path.stat().st_size >= LONG) == long
+    ]
     unchanged = 0
-    for path in (p for p in paths if p.stat().st_size < 400_000):
+    for path in paths:
         try:
             done = olp.correct(path, pinned(described, case))
             # the file itself, and that of its data where it has one
@@ -178,7 +188,7 @@ def test_l1_l3_every_specimen_stays_unchanged(corpus: Path, tmp_path: Path, name
             assert isinstance(refusal, ProgramError), path.name
             assert refusal.line is not None, path.name
             assert case.name not in ("apt", "dmis"), refusal
-    assert unchanged
+    assert unchanged or (long and not paths)
 
 
 # -- L2: bytes outside edits; a shift edits every slot -------------------------------------------------
@@ -235,9 +245,9 @@ def commanded(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", some_fast(CASES, 4))
+@pytest.mark.parametrize("name", left_to_a_campaign(CASES, ALIKE))
 @given(seed=st.integers(0, 2**16), digits=st.sampled_from([2, 3, 4]))
-@settings(max_examples=6)
+@settings(max_examples=4)
 def test_l4_points_within_half_a_digit(bent: dict[str, Path], name: str, seed: int, digits: int) -> None:
     rng = np.random.default_rng(seed)
     nominal = np.round(rng.uniform((-60, -50, -20), (60, 50, 40), (15, 3)), digits)

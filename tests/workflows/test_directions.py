@@ -48,7 +48,7 @@ def directed(judge: Judge, text: bytes, control: str) -> bytes:
 def test_directions_are_corrected_as_the_judge_finds(chain: str, control: str, tmp_path: Path) -> None:
     machine = machine_file(tmp_path, chain, control=control)
     judge = Judge(machine)
-    nominal = directed(judge, program(chain, seed=3, moves=4, tips=True), control)
+    nominal = directed(judge, program(chain, seed=3, moves=2, tips=True), control)
     result = olp.correct_joints(nominal, machine, tolerance_urad=2.0)
     assert result.report["verdict"]["ok"], result.to_text()
     distance, angle = judge.judged(nominal, result.data)

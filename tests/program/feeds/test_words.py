@@ -152,7 +152,7 @@ def test_the_planned_mean_of_a_block_in_every_mode() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=10)
+@settings(max_examples=6)
 @given(st.lists(st.tuples(PLACES, PLACES, st.none() | st.floats(1, 30000)), min_size=1, max_size=12))
 def test_written_programs_move_alike_and_no_faster(moves: list[tuple[float, float, float | None]]) -> None:
     text = "G21 G90 G1 F3000\n" + "".join(

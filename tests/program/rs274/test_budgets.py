@@ -205,7 +205,7 @@ def check_growth(texts: list[str], place: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", REPEATED)
 def test_work_grows_with_the_text_and_no_faster(name: str, tmp_path: Path) -> None:
-    texts = [HEAD + REPEATED[name] * count + "M2\n" for count in (60, 120, 180)]
+    texts = [HEAD + REPEATED[name] * count + "M2\n" for count in (40, 80, 120)]
     check_growth(texts, machine(tmp_path, tables=TABLES))
 
 
@@ -213,7 +213,7 @@ def test_work_grows_with_the_text_and_no_faster(name: str, tmp_path: Path) -> No
 @pytest.mark.parametrize("kind", KINDS)
 def test_work_grows_with_lines_of_a_kind_and_no_faster(kind: str, tmp_path: Path) -> None:
     place = machine(tmp_path, "[squareness]\nC0Y_urad = 20.0\n", tables=TABLES)
-    check_growth([program(kind, lines) for lines in (400, 800, 1200)], place)
+    check_growth([program(kind, lines) for lines in (300, 600, 900)], place)
 
 
 def calls(text: str, place: Path) -> int:
