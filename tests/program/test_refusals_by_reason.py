@@ -29,7 +29,7 @@ ACCEPTED = {
 #: What speaks against a program of the Sinumerik folder, most of which are subprograms, cycles of machine
 #: builders and tests of editors: the code, and what the message says.
 SINUMERIK = {
-    "OLP542": "is not in this file nor beside it|needs OF behind|not in its direction",
+    "OLP542": "is not in this file nor beside it|needs OF behind|not in its direction|so it may be rounded",
     "OLP541": "has no value that the program sets|whose value only the control knows",
     "OLP512": "tilts the plane|variable of the control|G43|G10|kinematics|inside the control",
     "OLP510": "is not understood",
