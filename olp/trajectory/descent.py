@@ -104,7 +104,7 @@ def least_time(
     """The spline of least time, from one strictly within the bounds. The first three and the last three
     coefficients are kept; others move by about `size_mm`. It is the last one on the way there that is `good`,
     or the first one."""
-    kept = spline
+    way = [spline]
     groups = bounds(spline, True)
     slacks = [group.slack() for group in groups]
     whole = spline.duration_s
@@ -129,8 +129,7 @@ def least_time(
                 break
             continue
         spline = there
-        if good(spline):
-            kept = spline
+        way.append(spline)
         dual_length = _advance(duals, slacks, changes, mu)
         groups = bounds(spline, True)
         slacks = [group.slack() for group in groups]
@@ -142,7 +141,8 @@ def least_time(
         times.append(spline.duration_s)
         if mu * count < _BARRIER and times[-1] > (1.0 - _DONE) * times[max(len(times) - 1 - _OVER, 0)]:
             break
-    return kept
+    # mostly the very last one is
+    return next((one for one in reversed(way[1:]) if good(one)), way[0])
 
 
 def _newton(
