@@ -7,13 +7,12 @@ manual on M70 to M73.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from olp.core.errors import ProgramError
-from olp.core.values import dataclass
 from olp.program.rs274.codes import COMPENSATION_OFF, CUTTER_COMPENSATION, GROUPS, LENGTHS, WORK_OFFSETS
 from olp.program.rs274.flatten.state import ProgramState, Value
-from olp.program.rs274.flatten.unit import Frame
+from olp.program.rs274.flatten.unit import Frame, Saved
 from olp.program.rs274.flatten.written import number_text
 
 #: M codes that save modes, drop and restore saved ones, and save them for one call.
@@ -36,18 +35,6 @@ _M_MODES = {
 }  # fmt: skip
 #: Modes that one code restores.
 _BY_CODE = frozenset({"the work offset", "the spindle"})
-
-
-@dataclass(frozen=True, slots=True)
-class Saved:
-    """Modes as they were in force: codes by group, further modes as words, F and S."""
-
-    unit: int | None
-    groups: Mapping[str, int]
-    path: str
-    further: Mapping[str, str]
-    feed: float | None
-    speed: float | None
 
 
 class SavedModes:
@@ -88,7 +75,7 @@ class SavedModes:
             )
         code = own[0][1]
         if code == RESTORE:
-            if not isinstance(frame.saved, Saved):
+            if frame.saved is None:
                 raise ProgramError("M72 without saved modes; M70 must come before", code="OLP532")
             return self.restoring(frame.saved)
         frame.saved = None if code == DROP else self._now()
@@ -98,7 +85,7 @@ class SavedModes:
     def leaving(self, frame: Frame) -> list[str]:
         """The blocks at the end of a subprogram, which M73 asks for."""
         saved, frame.saved = frame.saved, None
-        return self.restoring(saved) if frame.restores and isinstance(saved, Saved) else []
+        return self.restoring(saved) if frame.restores and saved is not None else []
 
     def _now(self) -> Saved:
         state = self._state

@@ -172,6 +172,18 @@ class Unit:
         return self._numbers
 
 
+@dataclass(frozen=True, slots=True)
+class Saved:
+    """Modes as they were in force: codes by group, further modes as words, F and S."""
+
+    unit: int | None
+    groups: Mapping[str, int]
+    path: str
+    further: Mapping[str, str]
+    feed: float | None
+    speed: float | None
+
+
 @dataclass(slots=True)
 class Frame:
     """One level of the run: the index of its next line, its local parameters and its open loops."""
@@ -194,5 +206,5 @@ class Frame:
     dos: dict[str, int] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     #: modes that this level has saved, and whether its end restores them
-    saved: object = None
+    saved: Saved | None = None
     restores: bool = False
