@@ -30,13 +30,15 @@ def some_of_a_campaign(cases: Iterable[Any], each: int) -> list[Any]:
 
 def left_to_a_campaign(cases: Iterable[Any], left: Container[Any]) -> list[Any]:
     """The cases of a slow test, those that are in `left` left to a campaign before a release."""
-    marked = [(case, pytest.mark.campaign if case in left else ()) for case in cases]
-    return [pytest.param(*(c if isinstance(c, tuple) else (c,)), marks=marks) for c, marks in marked]
+    return [_marked(case, case in left, pytest.mark.campaign) for case in cases]
 
 
 def _others_marked(cases: Iterable[Any], each: int, mark: pytest.MarkDecorator) -> list[Any]:
-    values = [case if isinstance(case, tuple) else (case,) for case in cases]
-    return [pytest.param(*value, marks=mark if k % each else ()) for k, value in enumerate(values)]
+    return [_marked(case, bool(k % each), mark) for k, case in enumerate(cases)]
+
+
+def _marked(case: Any, marked: bool, mark: pytest.MarkDecorator) -> Any:
+    return pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=mark if marked else ())
 
 
 def in_each(cases: Iterable[Case], name: Callable[[Case], str]) -> Callable[[Callable[[Case], None]], Any]:
