@@ -59,6 +59,9 @@ def test_a_part_of_too_many_runs_is_optimised() -> None:
     marked, _ = searched(runs(2000), 8001, solve, solve, 1.0)
     cost = sum(run.cost() for run in marked if run.optimise)
     assert 100_000 < cost < 150_000
+    # what each waypoint adds is its own; of the rest a route has its share
+    part, _ = searched(runs(2000), 8001, solve, solve, 0.5)
+    assert cost - sum(run.cost() for run in part if run.optimise) == pytest.approx(50_000, rel=0.05)
     # the gain of few of many runs is nothing for the whole
     solve = Solving(by_speed(0.04))
     marked, _ = searched(runs(8_000), 32_001, solve, solve, 1.0)
@@ -69,8 +72,9 @@ def test_long_runs_are_optimised_without_trials_as_far_as_affordable() -> None:
     solve = Solving(by_speed(0.0))
     marked, _ = searched(runs(10, 5000), 50_001, solve, solve, 1.0)
     assert all(run.optimise for run in marked) and not solve.asked
-    marked, _ = searched(runs(100, 5000), 500_001, solve, solve, 1.0)
-    assert not any(run.optimise for run in marked)
+    for count, share in ((100, 1.0), (10, 0.1)):
+        marked, _ = searched(runs(count, 5000), count * 5000 + 1, solve, solve, share)
+        assert not any(run.optimise for run in marked)
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.004, True), (0.0002, False)])

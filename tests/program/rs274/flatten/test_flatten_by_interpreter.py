@@ -135,6 +135,7 @@ M2
     "modes saved in levels": "G21 G90 G54 G17 G94 G64\nF200\nG0 X1 Y2 Z3\no1 sub\nM73\nG91 G20 G55 F3\nX1\n"
     "o2 call\nG1 X1\no1 endsub\no2 sub\nM73\nG90 G21 G98 G64 P0.1\nX7\no3 if [#5420 GT 0]\no2 return\n"
     "o3 endif\no2 endsub\no1 call\nX5\nG91 X1\no1 call\nX2\nM2\n",
+    "modes saved and kept": "G21 G90 G0 X1\no1 sub\nM70\nG91\no1 endsub\no1 call\nX5\nY[#5420]\nM2\n",
     "modes saved twice": "G21 G90 S500 M3 F100\nG0 X1\no1 sub\nM70\nG91 G1 X1 F50\nM5\nM72\nX9\nG18\nM72\n"
     "Y[#5420]\nM71\no1 endsub\no1 call\nX5\nM98 P7 L2\nX1\nM2\no7\nM73\nG91\nX1\nM99\n",
     "indirect": "#10=11 #11=12 #12=1.5\nG21 G0 X##10 Y###10 Z[##[5+5]-#11]\nM2\n",

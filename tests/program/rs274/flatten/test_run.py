@@ -362,6 +362,10 @@ def test_what_m72_restores_is_written() -> None:
     ]  # fmt: skip
     # nothing has changed
     assert lcnc("G21\no1 sub\nM73\nG0 X1\no1 endsub\no1 call\nM2\n").splitlines() == ["G21", "G0 X1", "M2"]
+    # M73 alone restores at the end of a level
+    text = "G21 G90\no1 sub\n{}\nG91\no1 endsub\no1 call\nG0 X1\nM2\n"
+    assert lcnc(text.format("M70")).splitlines() == ["G21 G90", "G91", "G0 X1", "M2"]
+    assert lcnc(text.format("M73")).splitlines() == ["G21 G90", "G91", "G90", "G0 X1", "M2"]
 
 
 def test_they_are_plain_codes_on_other_controls() -> None:
