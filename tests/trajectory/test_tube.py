@@ -18,7 +18,7 @@ from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.solvers import TUBE
 from olp.trajectory.stretches import runs_of
 from olp.trajectory.timespline import TimeSpline
-from olp.trajectory.tube import _Tube, in_tube
+from olp.trajectory.tube import _itself, _Tube, in_tube
 
 LIMITS = AxisLimits(np.array([500.0, 400.0, 300.0]), np.array([5e3, 4e3, 3e3]), np.array([1e5, 8e4, 6e4]))
 
@@ -230,3 +230,12 @@ def test_a_run_that_is_passed_in_a_few_cells_is_refused_with_its_reason() -> Non
     route = route_of(np.array([[0.0, 0.0], [1e-4, 0.0], [1e-4, 1e-4]]), 50.0)
     with pytest.raises(CannotCompute, match="too few cells"):
         in_tube(route, LIMITS, overlap(replace(route, tolerance_mm=np.zeros(3)), LIMITS))
+
+
+@pytest.mark.parametrize(("share", "inside"), [(1.0, True), (0.5, False)])
+def test_a_motion_that_leaves_its_tube_is_no_start(share: float, inside: bool) -> None:
+    """It has all of a corner's tolerance, and twice what the narrower tube leaves."""
+    found = in_tube(
+        route_of(corner(45.0, 5.0), 0.1), LIMITS, overlap(route_of(corner(45.0, 5.0), 0.1), LIMITS)
+    )
+    assert (_itself(route_of(corner(45.0, 5.0), 0.1 * share), LIMITS, found) is not None) is inside
