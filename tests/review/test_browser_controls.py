@@ -285,6 +285,17 @@ def test_pictures_switch_by_all_four_arrows(page: Any) -> None:
     assert page.evaluate("olp.state.row") == row
 
 
+@pytest.mark.parametrize(
+    ("which", "says", "why"), [("page", "", "planned"), ("two_tools", "by feed", "feed")]
+)
+def test_the_clock_says_where_its_times_come_from(
+    which: str, says: str, why: str, request: pytest.FixtureRequest
+) -> None:
+    clock = request.getfixturevalue(which).locator("#time-value")
+    assert clock.inner_text().partition(" / ")[2].partition(" ")[2] == says
+    assert why in clock.get_attribute("title")
+
+
 def test_a_tool_and_an_operation_keep_their_rapids(two_tools: Any, drilled: Review) -> None:
     path, samples = drilled.scene.nominal.toolpath, drilled.scene.samples
     tools = np.array([-1 if f.tool is None else f.tool for f in path.frames])[path.frame[samples.move]]

@@ -17,6 +17,9 @@
       this.bar = $("time");
       Object.assign(this.bar, {min: app.time[0], max: app.end});
       this.bar.oninput = () => app.set_time(+this.bar.value);
+      const by_feed = app.manifest.time_source === "feed";
+      this.source = by_feed ? " by feed" : "";
+      $("time-value").title = by_feed ? "At the programmed feed: the motion is not planned" : "As planned";
       $("play").onclick = () => this.play(!app.state.playing);
       $("step-back").onclick = () => app.step(-1);
       $("step-forward").onclick = () => app.step(1);
@@ -52,7 +55,7 @@
         "--done",
         `${(100 * (state.time - this.app.time[0])) / Math.max(1e-9, end - this.app.time[0])}%`,
       );
-      $("time-value").textContent = `${clock(state.time)} / ${clock(end)}`;
+      $("time-value").textContent = `${clock(state.time)} / ${clock(end)}${this.source}`;
     }
   }
 
