@@ -99,13 +99,13 @@ def environment() -> dict[str, str]:
     return kept | {"PATH": path, "COLUMNS": "100"}
 
 
-def run(body: str, folder: Path, *, timeout_s: float = 300.0) -> tuple[int, str]:
+def run(body: str, folder: Path) -> tuple[int, str]:
     """Exit code of a text for the shell, and what it writes to stdout and stderr."""
     shell = shutil.which("bash")
     if shell is None:
         pytest.skip("needs bash")
     done = subprocess.run(
-        [shell, "-euo", "pipefail", "-c", body], cwd=folder, env=environment(), timeout=timeout_s,
+        [shell, "-euo", "pipefail", "-c", body], cwd=folder, env=environment(), timeout=300,
         check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
     return done.returncode, done.stdout
