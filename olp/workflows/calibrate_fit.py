@@ -26,7 +26,7 @@ from olp.core.progress import Progress
 from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration
 from olp.files.calibration.writer import calibration_files
-from olp.files.measurements.reader import files_of_measurements, load_measurements
+from olp.files.measurements.reader import files_left_out, files_of_measurements, load_measurements
 from olp.findings.catalogue import Finding
 from olp.workflows.session import PathLike, Session
 from olp.workflows.shown import Filed
@@ -90,11 +90,13 @@ def fit_calibration(
     """
     described = None if machine is None else Session.start(machine).setup.machine
     inputs: tuple[str, ...] = ()
+    left: tuple[str, ...] = ()
     if isinstance(data, Measurements):
         measurements = data
     else:
         sources = [data] if isinstance(data, str | Path) else list(data)
         inputs = files_of_measurements(sources)
+        left = files_left_out(sources)
         measurements = load_measurements(sources, None if described is None else described.chain)
     chain = described.chain if described is not None else measurements.chain
     if chain is None:
@@ -129,7 +131,8 @@ def fit_calibration(
     tools = [] if described is None else [tool.tool_vector_mm for tool in described.tools.values()]
     tool_vectors = [tool_vector for tool_vector in tools if tool_vector is not None]
     findings = (
-        *findings_of(fitted, tool_vectors, travel), *agreement_findings(found, fitted, tool_vectors)
+        *findings_of(fitted, tool_vectors, travel), *agreement_findings(found, fitted, tool_vectors),
+        *([Finding("OLP862", f"not read: {', '.join(left)}")] if left else []),
     )  # fmt: skip
     _refuse_absurd(fitted, findings)
     report = summary(fitted, calibration, tool_vectors)

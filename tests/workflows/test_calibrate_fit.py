@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -142,6 +143,29 @@ def test_every_sense_becomes_that_of_the_contract(tmp_path: Path, sense: str, fa
     planned(tmp_path, line("exx", "EXX", f'sense = "{sense}"'), exx=LENGTHS)
     (line_read,) = load_measurements([tmp_path], "XFYZ").lines
     assert line_read.value == pytest.approx(factor * np.array([0.0, 2.5, 0.5, 3.5]) * 1e-3)
+
+
+@pytest.mark.slow
+def test_a_folder_without_a_plan_says_which_files_it_left_out(tmp_path: Path) -> None:
+    head = (
+        '# component = "EXX"\n# machine = "m"\n# measured = 2026-05-14\n# temperature_degC = 20.0\n'
+        '# sense = "actual-minus-commanded"\n# line_mm = { Y = 0.0, Z = 0.0 }\n# tool_mm = [0, 0, 0]\n'
+    )
+    rows = [f"{10 * k - 300},{run},1,{0.1 * k + 0.01 * run}" for run in (1, 2) for k in range(11)]
+    (tmp_path / "exx.csv").write_text("\n".join((head + "target_mm,run,direction,value_um", *rows)))
+    (tmp_path / "laser-y.txt").write_text("0 1\n100 2\n")
+    (tmp_path / "photo.jpg").write_bytes(b"\xff\xd8")
+    machine = mill_of(tmp_path).with_name("mill.toml")
+    text = machine.with_name("machine.toml").read_text()
+    machine.write_text(re.sub(r'name = "[^"]*"', 'name = "m"', text, count=1))
+    target = tmp_path / "calibration.toml"
+    # the second time its own files lie there, too
+    for _ in range(2):
+        call = ["calibrate", "fit", str(tmp_path), "-m", str(machine), "-o", str(target), "--force"]
+        done = CliRunner().invoke(main, [*call, "--fail-on", "error"])
+        assert done.exit_code == 0, done.output
+        assert f"not read: {tmp_path / 'laser-y.txt'}" in target.read_text().replace("\n# ", " ")
+    assert "photo" not in target.read_text()
 
 
 def test_files_that_describe_themselves(tmp_path: Path) -> None:

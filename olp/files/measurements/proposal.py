@@ -3,20 +3,24 @@ what no file says is asked for."""
 
 from __future__ import annotations
 
+import contextlib
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from olp.core.errors import ConfigError
+from olp.core.errors import ConfigError, InputError
 from olp.core.machine import Machine
 from olp.core.schema import fields_of
 from olp.core.values import dataclass
 from olp.files.columns import decoded
 from olp.files.measurements.instruments.base import Instrument, SeenFile
+from olp.files.measurements.instruments.lines import LineFiles
 from olp.files.measurements.instruments.registry import INSTRUMENTS
 from olp.files.measurements.line_keys import LineKeys
+from olp.files.measurements.line_profile import LineProfile, load_line_profile, read_line
 from olp.files.measurements.point_readings import COVARIANCE, SIGMA, TOOL
+from olp.files.measurements.reader import readings_in
 from olp.files.measurements.rtl import is_stored_line, parse_rtl
 from olp.files.measurements.schemas import PlanFile
 from olp.files.measurements.stated import stated_keys
@@ -36,6 +40,12 @@ _OF_LINES = ("sense", "line_mm", "tool_mm")
 _COLUMNS_OF = {"tool_mm": TOOL, "sigma_um": (*SIGMA, *COVARIANCE)}
 #: Keys of the whole plan that files may state.
 _OF_ALL = ("machine", "measured", "temperature_degC")
+#: Lines, which alone have profiles.
+LINES = LineFiles()
+#: The convention of readings after their profile.
+SENSED = "actual-minus-commanded"
+#: An instrument, what a file of it shows, and the keys of its table.
+Known = tuple[Instrument[Any, Any], SeenFile, dict[str, object]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,20 +60,21 @@ class Proposal:
 def propose(folder: Path, machine: Machine | None = None) -> Proposal:
     """The plan for the files of a folder. Raises InputError where one cannot be read, and ConfigError where
     none is known."""
-    known: list[tuple[Instrument[Any, Any], SeenFile, dict[str, object]]] = []
+    known: list[Known] = []
     unknown: list[str] = []
-    for path in sorted(p for p in folder.iterdir() if p.suffix.lower() in (*COLUMNS, *STORED)):
-        seen = _seen(path)
-        found = ((instrument, instrument.proposed(seen)) for instrument in INSTRUMENTS)
-        taken = next(((instrument, keys) for instrument, keys in found if keys is not None), None)
+    profiles = _profiles(folder)
+    for path in readings_in(folder):
+        taken = _taken(path, profiles)
         if taken is None:
             unknown.append(path.name)
         else:
-            known.append((taken[0], seen, taken[1]))
+            known.append(taken)
     if not known:
         endings = ", ".join((*COLUMNS, *STORED))
         raise ConfigError(
-            f"holds no file of readings that says what it is; expected some of {endings}", file=str(folder)
+            f"holds no file of readings that says what it is; expected some of {endings}, or a profile "
+            "(olp-line-profile-1) beside files of another layout",
+            file=str(folder),
         )
     asked: list[str] = []
     lines = [*_whole([seen for _, seen, _ in known], machine, asked), ""]
@@ -71,6 +82,37 @@ def propose(folder: Path, machine: Machine | None = None) -> Proposal:
     for instrument, seen, keys in known:
         lines += ["", f"[[{instrument.key}]]", *_table(instrument, seen, keys, asked)]
     return Proposal("\n".join(lines) + "\n", tuple(asked), tuple(unknown))
+
+
+def _taken(path: Path, profiles: Mapping[str, LineProfile]) -> Known | None:
+    """The instrument of a file and what it shows: by itself, or by the first profile that reads it."""
+    if path.suffix.lower() in (*COLUMNS, *STORED):
+        seen = _seen(path)
+        found = ((instrument, instrument.proposed(seen)) for instrument in INSTRUMENTS)
+        taken = next(((instrument, keys) for instrument, keys in found if keys is not None), None)
+        if taken is not None:
+            return taken[0], seen, taken[1]
+    for name, profile in profiles.items():
+        try:
+            readings = read_line(path, profile)
+        except InputError:
+            continue
+        stated = {key: written for key, (written, _) in readings.keys.items()}
+        if readings.sense_known:
+            stated["sense"] = SENSED
+        value = "value_urad" if readings.angular else "value_um"
+        seen = SeenFile(path.name, ("target_mm", value), stated, readings.component)
+        return LINES, seen, {**(LINES.proposed(seen) or {}), "profile": name}
+    return None
+
+
+def _profiles(folder: Path) -> dict[str, LineProfile]:
+    """The layouts of files of lines that a folder holds, by the names of their files."""
+    profiles = {}
+    for path in sorted(folder.glob("*.toml")):
+        with contextlib.suppress(InputError):
+            profiles[path.name] = load_line_profile(path)
+    return profiles
 
 
 def _seen(path: Path) -> SeenFile:

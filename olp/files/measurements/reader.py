@@ -37,6 +37,10 @@ from olp.files.write import PathLike, read_bytes
 PLAN = "measurements.toml"
 #: Endings of files in a folder without a plan that may describe themselves.
 ALONE = (".csv", ".rtl")
+#: Endings of what lies beside readings and never is some: settings, papers, pictures.
+BESIDE = (".toml", ".json", ".md", ".html", ".pdf", ".png", ".jpg", ".jpeg", ".svg")
+#: The format of calibrations.
+CALIBRATION = "olp-calibration-1"
 #: Keys of tables that name a file.
 _FILES = ("file", "profile", "certificate")
 
@@ -113,7 +117,7 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
         path = FilePath(source)
         plan = path / PLAN if path.is_dir() else path
         if path.is_dir() and not plan.is_file():
-            names += sorted(file for file in path.iterdir() if file.suffix.lower() in ALONE)
+            names += _alone_in(path)
             continue
         names.append(plan)
         if plan.suffix.lower() != ".toml":
@@ -127,6 +131,40 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
             # The loader reports what is wrong with it.
             continue
     return tuple(str(name) for name in names)
+
+
+def files_left_out(sources: Sequence[PathLike]) -> tuple[str, ...]:
+    """Files of folders without a plan that may hold readings, and that `load_measurements` does not read."""
+    folders = [path for path in map(FilePath, sources) if path.is_dir() and not (path / PLAN).is_file()]
+    files = (file for folder in folders for file in readings_in(folder))
+    return tuple(str(file) for file in files if file.suffix.lower() not in ALONE)
+
+
+def readings_in(folder: FilePath) -> list[FilePath]:
+    """The files of a folder that may hold readings, as far as names tell: those of a calibration that was
+    written there do not."""
+    calibrated = {name for path in folder.glob("*.toml") for name in _made(path)}
+    return [
+        path
+        for path in sorted(folder.iterdir())
+        if path.is_file()
+        and not path.name.startswith(".")
+        and path.suffix.lower() not in BESIDE
+        and path.name not in calibrated
+    ]
+
+
+def _made(path: FilePath) -> Iterator[str]:
+    """The files that a calibration names; none where a file is no calibration."""
+    try:
+        stated = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
+    except (InputError, ValueError):
+        return
+    if stated.get("schema") == CALIBRATION:
+        for value in stated.values():
+            for table in value if isinstance(value, list) else [value]:
+                if isinstance(table, dict):
+                    yield from (str(table[key]) for key in _FILES if key in table)
 
 
 # -- plans -----------------------------------------------------------------------------------------------
@@ -199,12 +237,16 @@ def _readings(
 
 
 def _folder(folder: FilePath, gathered: _Gathered) -> None:
-    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in ALONE)
+    files = _alone_in(folder)
     if not files:
         sentence = f"holds neither {PLAN} nor files {' or '.join(ALONE)}; expected one of them"
         gathered.errors.append(ConfigError(sentence, file=str(folder)))
     for path in files:
         _alone(path, gathered)
+
+
+def _alone_in(folder: FilePath) -> list[FilePath]:
+    return [path for path in readings_in(folder) if path.suffix.lower() in ALONE]
 
 
 def _alone(path: FilePath, gathered: _Gathered) -> None:

@@ -111,4 +111,14 @@ RULES = (
         "tip, tighten the stylus, and touch again.",
         "Touches scatter by 9 um where 1 um is stated.",
     ),
+    _rule(
+        "OLP862",
+        "files of a folder left out",
+        Severity.WARNING,
+        "A folder without a plan is read as files that describe themselves. Others lie beside them that may "
+        "hold readings, and no reading of theirs went into the calibration.",
+        "Write a plan that names them with a profile: `olp calibrate fit FOLDER --propose "
+        "FOLDER/measurements.toml` begins one. Move away what holds no readings.",
+        "A laser's `laser-x.txt` beside `eyx.csv` and `ebx.csv`.",
+    ),
 )

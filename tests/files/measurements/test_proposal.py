@@ -92,6 +92,23 @@ def test_a_component_is_taken_from_a_name_that_says_it_and_fits_its_unit(
     assert table["component"] == (component or ASKED)
 
 
+def test_a_profile_of_the_folder_reads_files_of_another_layout(tmp_path: Path) -> None:
+    for name in ("laser.toml", "laser-x.txt", "machine.toml"):
+        shutil.copy(PROGRAMS / "gantry-lines" / name, tmp_path)
+    shutil.copy(tmp_path / "laser-x.txt", tmp_path / "laser EYY.txt")
+    (tmp_path / "notes.txt").write_text("cold in the hall\n")
+    (tmp_path / "photo.JPG").write_bytes(b"\xff\xd8")
+    proposal = propose(tmp_path)
+    plan = tomllib.loads(proposal.text)
+    assert plan["lines"] == [
+        {"file": "laser EYY.txt", "component": "EYY", "profile": "laser.toml"},
+        {"file": "laser-x.txt", "profile": "laser.toml", "component": ASKED},
+    ]
+    # the profile states the sense, and a line has it once
+    assert "sense" not in plan["defaults"]
+    assert proposal.unknown == ("notes.txt",)
+
+
 def test_days_that_contradict_are_asked_for(tmp_path: Path) -> None:
     for k, day in enumerate(("2026-05-14", "2026-05-15")):
         (tmp_path / f"exx-{k}.csv").write_text(f"# measured = {day}\n# sense = table-motion\n" + LINE)
