@@ -38,13 +38,15 @@ RADIUS_MM = 1.5875
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a program: `code` and `line` of its refusal, empty and 0 where it was read."""
+    """What became of a program: `code` and `line` of its refusal, empty and 0 where it was read. `kept` says
+    that a machine without errors changed none of its bytes; what was unrolled is not compared."""
 
     folder: str
     name: str
     code: str = ""
     line: int = 0
     why: str = ""
+    kept: bool = True
 
     @property
     def family(self) -> str:
@@ -99,8 +101,8 @@ def _outcome(path: Path, setup: olp.Setup) -> Outcome:
     error: OlpError | None = None
     for flatten in (False, True):
         try:
-            olp.correct(path, setup, flatten=flatten)
-            return Outcome(path.parent.name, path.name)
+            data = olp.correct(path, setup, flatten=flatten).data
+            return Outcome(path.parent.name, path.name, kept=flatten or data == path.read_bytes())
         except OlpError as refusal:
             error = error or refusal
             if isinstance(refusal, ProgramError) and (flatten or refusal.code != "OLP511"):
