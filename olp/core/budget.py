@@ -5,6 +5,13 @@ from __future__ import annotations
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 
+#: Bytes of blocks that the run of a short parametric program may visit, and for each byte of a longer one.
+RUN_BYTES = 12_000_000
+RUN_PER_BYTE = 80
+_RUN_TOO_LONG = (
+    "the run visits more than {limit} bytes of blocks; correct an endless loop, or divide the program"
+)
+
 
 @dataclass(slots=True)
 class Budget:
@@ -19,6 +26,12 @@ class Budget:
     def of(cls, size: int, *, least: int, per_byte: float, message: str) -> Budget:
         """For an input of `size` bytes: `least`, or so much for each byte where that is more."""
         return cls(max(least, int(per_byte * size)), message)
+
+    @classmethod
+    def of_run(cls, size: int, limit: int = RUN_BYTES, message: str = _RUN_TOO_LONG) -> Budget:
+        """For what a parametric program of `size` bytes makes: `limit`, or `RUN_PER_BYTE` where that is
+        more."""
+        return cls.of(size, least=limit, per_byte=RUN_PER_BYTE, message=message)
 
     @property
     def left(self) -> int:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from olp.core.budget import Budget
+from olp.core.budget import RUN_BYTES, Budget
 from olp.core.errors import ProgramError, UsageError
 from olp.core.values import dataclass
 from olp.program.apt.table import FREE
@@ -36,9 +36,6 @@ _NUMBERS = {
 }  # fmt: skip
 #: statements that would have to move too, in a way that is not written
 _FIXED = frozenset((b"FROM", b"TRACUT", b"TRANS", b"CSYS", b"MSYS", b"ORIGIN", b"UNITS", b"UNIT"))
-#: bytes of copies: of a short program, and for each byte
-UNROLLED_BYTES = 12_000_000
-UNROLLED_PER_BYTE = 80
 _TOO_LONG = "the copies are more than {limit} bytes; divide the program"
 
 
@@ -53,13 +50,13 @@ class _Piece:
 
 
 def unroll(
-    data: bytes, dialect: Dialect, *, limit: int = UNROLLED_BYTES, expand_cycles: bool = False, **_: Any
+    data: bytes, dialect: Dialect, *, limit: int = RUN_BYTES, expand_cycles: bool = False, **_: Any
 ) -> Unrolled:
     """A program with its copies written out, and the origin of each line. Raises ProgramError with the line
     of a COPY whose range or form is not read, and UsageError where cycles are to be expanded too."""
     if expand_cycles:
         raise UsageError("cycles are made by the post-processor; leave --expand-cycles out")
-    budget = Budget.of(len(data), least=limit, per_byte=UNROLLED_PER_BYTE, message=_TOO_LONG)
+    budget = Budget.of_run(len(data), limit, _TOO_LONG)
     pieces: list[_Piece] = []
     begins: dict[bytes, int] = {}
     copied: set[bytes] = set()

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from olp.core.budget import Budget
+from olp.core.budget import RUN_BYTES, Budget
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.values import dataclass
@@ -26,10 +26,6 @@ from olp.program.heidenhain.plain.writing import written_out
 from olp.program.heidenhain.statements import Statement, cycle_of, of_lines
 from olp.program.origin import Origin, Unrolled
 
-#: bytes of executed blocks: of a short program, and for each byte
-UNROLLED_BYTES = 12_000_000
-UNROLLED_PER_BYTE = 80
-_TOO_LONG = "the run visits more than {limit} bytes of blocks; correct an endless loop, or divide the program"
 #: calls inside one another at most
 _DEEPEST = 20
 _LABEL = re.compile(rb'LBL[ \t]*("[^"]*"|\d+)', re.I)
@@ -100,7 +96,7 @@ def unroll(
     expand_cycles: bool = False,
     peck_clearance: float | None = None,
     parameters: Mapping[str, float] | None = None,
-    limit: int = UNROLLED_BYTES,
+    limit: int = RUN_BYTES,
     setup: Setup | None = None,
 ) -> Unrolled:
     """Plain blocks of a program, with the origin of each. Blocks with `/` are left as they are. `parameters`
@@ -110,9 +106,7 @@ def unroll(
         raise ProgramError(
             "cycles of this dialect are not written out; leave --expand-cycles out", code="OLP544"
         )
-    run = _Run(dialect, subprograms, Radius(setup), Budget.of(
-        len(data), least=limit, per_byte=UNROLLED_PER_BYTE, message=_TOO_LONG
-    ))  # fmt: skip
+    run = _Run(dialect, subprograms, Radius(setup), Budget.of_run(len(data), limit))
     run.parameters.update({name.upper(): value for name, value in (parameters or {}).items()})
     run.stated = dict(run.parameters)
     run.visit(_Unit.of(data, "", dialect), 0, 0, main=True)

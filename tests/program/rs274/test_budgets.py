@@ -13,6 +13,7 @@ from cases.event_lines import KINDS, program
 from cases.fast import some_fast
 
 import olp
+from olp.core import budget
 from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.program.registry import named
@@ -82,7 +83,7 @@ NESTED += "".join(f"o{k} endrepeat\n" for k in reversed(range(12)))
 def test_unrolling_is_bounded_by_the_bytes_of_visited_blocks(
     dialect: str, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(unroll, "UNROLLED_PER_BYTE", 0)
+    monkeypatch.setattr(budget, "RUN_PER_BYTE", 0)
     with pytest.raises(ProgramError, match="visits more than 200000 bytes of blocks; correct") as caught:
         unroll.flatten(text.encode(), profile(dialect), limit=200_000)
     assert caught.value.line is not None

@@ -18,7 +18,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from olp.core.budget import Budget
+from olp.core.budget import RUN_BYTES, Budget
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.program.origin import Origin, Unrolled, Within
@@ -47,11 +47,6 @@ _ENDS = frozenset({2, 30})
 #: Cycles for which the control turns the spindle in step, or stops it at an angle.
 _BY_CONTROL = SHIFTED_BORES | {740, 840}
 
-#: bytes of visited blocks, each with some for the visit itself: of a short program, and for each byte
-UNROLLED_BYTES = 12_000_000
-UNROLLED_PER_BYTE = 80
-_TOO_LONG = "the run visits more than {limit} bytes of blocks; correct an endless loop, or divide the program"
-
 
 def no_subprograms(name: str) -> tuple[str, bytes] | None:
     """The default of `flatten`: there is no other file."""
@@ -69,7 +64,7 @@ def flatten(
     peck_clearance: float | None = None,
     parameters: Mapping[str, float] | None = None,
     setup: Setup | None = None,
-    limit: int = UNROLLED_BYTES,
+    limit: int = RUN_BYTES,
 ) -> Unrolled:
     """Plain blocks of a program, with the origin of each; see the module for what is kept.
 
@@ -79,7 +74,7 @@ def flatten(
     G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance of G73 and G83, needed
     where a parameter of the control sets it. `parameters` are values that parameters such as "#100" have in
     the control, `setup` has the work offsets. `limit` is the work that a short program may cause, in bytes of
-    visited blocks; a long one may cause `UNROLLED_PER_BYTE` for each of its bytes. Raises ProgramError with
+    visited blocks; a long one may cause `RUN_PER_BYTE` for each of its bytes. Raises ProgramError with
     the line in the source, or with the line in the subprogram and its file.
     """
     strokes = stroke_budget(len(data))
@@ -88,7 +83,7 @@ def flatten(
         setup=setup, switch_open=block_delete is None,
     )  # fmt: skip
     main = Unit(data, profile, file)
-    budget = Budget.of(len(data), least=limit, per_byte=UNROLLED_PER_BYTE, message=_TOO_LONG)
+    budget = Budget.of_run(len(data), limit)
     Walk(
         main, writer.variables, subprograms, writer.block, writer.leave, budget, block_delete=block_delete
     ).run()

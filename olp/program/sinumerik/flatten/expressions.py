@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, MutableMapping
 from functools import lru_cache
+from operator import add, mul, sub
 
 from olp.core.errors import ProgramError
 from olp.core.patterns import PARAMETER_NAMES
@@ -17,6 +18,8 @@ from olp.core.patterns import PARAMETER_NAMES
 Value = float | bool | str
 #: Names of variables by their capitals, an index in brackets among them.
 Variables = MutableMapping[str, Value]
+#: An expression that was read.
+Term = Callable[[Variables], Value]
 
 _TOKEN = re.compile(
     r"[ \t]*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:EX[+-]?\d+)?)|(?P<text>\"[^\"]*\")"
@@ -28,9 +31,13 @@ _LEVELS: tuple[tuple[str, ...], ...] = (
     ("==", "<>", "<", ">", "<=", ">="), ("OR",), ("XOR",), ("AND",), ("+", "-"), ("*", "/", "DIV", "MOD"),
 )  # fmt: skip
 _RANK: Mapping[str, int] = {sign: rank for rank, signs in enumerate(_LEVELS) for sign in signs}
+#: Operators that two numbers always have.
+_PLAIN: Mapping[str, Callable[[float, float], float]] = {
+    "+": add, "-": sub, "*": mul,
+}  # fmt: skip
 #: The kind of what is no token.
 _BAD = "bad"
-#: Expressions whose tokens are kept: a program has fewer, and runs each many times.
+#: Expressions that are kept as they were read: a program has fewer, and runs each many times.
 _KEPT = 4096
 _LOGICAL = frozenset({"OR", "XOR", "AND"})
 
@@ -52,11 +59,7 @@ _NAMED: Mapping[str, Value] = {"TRUE": True, "FALSE": False, "$PI": math.pi}
 
 def evaluate(text: str, variables: Variables) -> Value:
     """The value of an expression. Raises ProgramError, without a line, for what cannot be computed here."""
-    reading = _Reading(text, variables)
-    value = reading.level(0)
-    if reading.kind:
-        raise reading.error("is not an expression")
-    return value
+    return _read(text)(variables)
 
 
 def number(text: str, variables: Variables) -> float:
@@ -67,7 +70,6 @@ def number(text: str, variables: Variables) -> float:
     return float(value)
 
 
-@lru_cache(_KEPT)
 def _tokens(text: str) -> tuple[tuple[str, str], ...]:
     """The kind and the text of each token; the last one is empty, or of the kind of what is none."""
     tokens, place = [], 0
@@ -78,11 +80,21 @@ def _tokens(text: str) -> tuple[tuple[str, str], ...]:
     return (*tokens, (_BAD if text[place:].strip() else "", ""))
 
 
+@lru_cache(_KEPT)
+def _read(text: str) -> Term:
+    """An expression as a function of the variables. Raises ProgramError where it is none."""
+    reading = _Reading(text)
+    term = reading.level(0)
+    if reading.kind:
+        raise reading.error("is not an expression")
+    return term
+
+
 class _Reading:
     """One expression while it is read: the present token, its kind empty behind the last one."""
 
-    def __init__(self, text: str, variables: Variables) -> None:
-        self.text, self.variables = text, variables
+    def __init__(self, text: str) -> None:
+        self.text = text
         self._tokens = iter(_tokens(text))
         self.kind, self.token = "", ""
         self.next()
@@ -96,7 +108,7 @@ class _Reading:
         if self.kind == _BAD:
             raise self.error("is not an expression")
 
-    def level(self, depth: int) -> Value:
+    def level(self, depth: int) -> Term:
         """A value made by the operators of this priority and closer ones."""
         value = self._signed()
         while self.kind != "text":
@@ -105,8 +117,19 @@ class _Reading:
                 break
             operator = self.token
             self.next()
-            value = self._applied(operator, value, self.level(rank + 1))
+            value = self._joined(operator, value, self.level(rank + 1))
         return value
+
+    def _joined(self, operator: str, left: Term, right: Term) -> Term:
+        plain = _PLAIN.get(operator)
+
+        def term(variables: Variables) -> Value:
+            first, second = left(variables), right(variables)
+            if plain is not None and type(first) is float and type(second) is float:
+                return plain(first, second)
+            return self._applied(operator, first, second)
+
+        return term
 
     def _applied(self, operator: str, left: Value, right: Value) -> Value:
         if operator in _LOGICAL:
@@ -117,93 +140,106 @@ class _Reading:
             if operator in ("==", "<>") and isinstance(left, str) and isinstance(right, str):
                 return (left == right) == (operator == "==")
             raise self.error("mixes text and numbers")
-        same = math.isclose(left, right, rel_tol=1e-12, abs_tol=1e-12)
         if operator in _LEVELS[0]:
+            same = math.isclose(left, right, rel_tol=1e-12, abs_tol=1e-12)
             less = left < right and not same
             return {"==": same, "<>": not same, "<": less, "<=": less or same, ">": not (less or same),
                     ">=": not less}[operator]  # fmt: skip
-        if operator in ("/", "DIV", "MOD") and not right:
+        if operator in _PLAIN:
+            return _PLAIN[operator](left, right)
+        if not right:
             raise self.error("divides by zero")
         if operator == "DIV":
             return float(math.trunc(left / right))
-        if operator == "MOD":
-            return math.fmod(left, right)
-        return {"+": left + right, "-": left - right, "*": left * right}.get(operator, left / (right or 1.0))
+        return math.fmod(left, right) if operator == "MOD" else left / right
 
-    def _signed(self) -> Value:
-        if self.token in ("-", "+", "NOT") and self.kind != "text":
-            sign = self.token
-            self.next()
-            value = self._signed()
+    def _signed(self) -> Term:
+        if self.token not in ("-", "+", "NOT") or self.kind == "text":
+            return self._operand()
+        sign = self.token
+        self.next()
+        operand = self._signed()
+
+        def term(variables: Variables) -> Value:
+            value = operand(variables)
             if (sign == "NOT") != isinstance(value, bool) or isinstance(value, str):
                 raise self.error(f"has {sign} in front of a value that takes none")
             return not value if sign == "NOT" else -value if sign == "-" else value
-        return self._operand()
 
-    def _operand(self) -> Value:
+        return term
+
+    def _operand(self) -> Term:
         kind, token = self.kind, self.token
         self.next()
         if kind == "number":
             body, _, power = token.partition("EX")
-            return float(body) * 10.0 ** int(power or 0)
+            return _constant(float(body) * 10.0 ** int(power or 0))
         if kind == "text":
-            return token[1:-1]
+            return _constant(token[1:-1])
         if (kind, token) == ("sign", "("):
-            value = self.level(0)
+            inner = self.level(0)
             self._expect(")")
-            return value
+            return inner
         if kind != "name":
             raise self.error("is not an expression")
         if (self.kind, self.token) == ("sign", "("):
             return self._called(token)
-        if (self.kind, self.token) == ("sign", "["):
+        if (self.kind, self.token) != ("sign", "["):
+            return _constant(_NAMED[token]) if token in _NAMED else lambda variables: _value(token, variables)
+        self.next()
+        index = [self.level(0)]
+        while self.token == ",":
             self.next()
-            index = [self._index()]
-            while self.token == ",":
-                self.next()
-                index.append(self._index())
-            self._expect("]")
-            token = indexed(token, index)
-        return self._value(token)
+            index.append(self.level(0))
+        self._expect("]")
+        return lambda variables: _value(indexed(token, [self._whole(i(variables)) for i in index]), variables)
 
-    def _index(self) -> int:
-        value = self.level(0)
+    def _whole(self, value: Value) -> int:
         if isinstance(value, str) or value != round(value):
             raise self.error("has an index that is not an integer")
         return round(value)
 
-    def _called(self, name: str) -> Value:
+    def _called(self, name: str) -> Term:
         if name not in _FUNCTIONS:
             raise self.error(f"calls {name}, whose value only the control knows", "OLP541")
         count, function = _FUNCTIONS[name]
         self.next()
-        values = [self.level(0)]
+        given = [self.level(0)]
         while self.token == "," and self.kind == "sign":
             self.next()
-            values.append(self.level(0))
+            given.append(self.level(0))
         self._expect(")")
-        if len(values) != count or any(isinstance(value, str) for value in values):
-            raise self.error(f"gives {name} other arguments than {count} numbers")
-        try:
-            return float(function(*values))
-        except (ValueError, OverflowError):
-            raise self.error(f"has no value of {name}") from None
 
-    def _value(self, name: str) -> Value:
-        if name in _NAMED:
-            return _NAMED[name]
-        if name not in self.variables:
-            named = PARAMETER_NAMES.fullmatch(name)
-            stated = "give it in the table [parameters] of the job file, or " if named else ""
-            raise ProgramError(
-                f"{name} has no value that the program sets; {stated}set it in the program", code="OLP541"
-            )
-        return self.variables[name]
+        def term(variables: Variables) -> Value:
+            values = [each(variables) for each in given]
+            if len(values) != count or any(isinstance(value, str) for value in values):
+                raise self.error(f"gives {name} other arguments than {count} numbers")
+            try:
+                return float(function(*values))
+            except (ValueError, OverflowError):
+                raise self.error(f"has no value of {name}") from None
+
+        return term
 
     def _expect(self, sign: str) -> None:
         if (self.kind, self.token) != ("sign", sign):
             raise self.error(f"lacks a `{sign}`")
         self.next()
+
+
+def _constant(value: Value) -> Term:
+    return lambda variables: value
+
+
+def _value(name: str, variables: Variables) -> Value:
+    try:
+        return variables[name]
+    except KeyError:
+        named = PARAMETER_NAMES.fullmatch(name)
+        stated = "give it in the table [parameters] of the job file, or " if named else ""
+        raise ProgramError(
+            f"{name} has no value that the program sets; {stated}set it in the program", code="OLP541"
+        ) from None
 
 
 def indexed(name: str, index: list[int]) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from olp.core.budget import Budget
+from olp.core.budget import RUN_BYTES, Budget
 from olp.core.units import AXES
 from olp.program.origin import Origin, Unrolled
 from olp.program.sinumerik.blocks import NUMBER, Form, Piece
@@ -35,10 +35,6 @@ _LABEL = re.compile(rb"\A([ \t]*/?\d?[ \t]*(?:N\d+[ \t]*)?)(?:[A-Z_][A-Z0-9_]+[ 
 _NUMBER = re.compile(rb"\A([ \t]*/?\d?[ \t]*)(?:N|:)[ \t]*\d+[ \t]*", re.IGNORECASE)
 #: What names a program in its file, and where it is.
 _HEADERS = (b"%", b";$PATH")
-#: bytes of visited blocks: of a short program, and for each byte
-UNROLLED_BYTES = 12_000_000
-UNROLLED_PER_BYTE = 80
-_TOO_LONG = "the run visits more than {limit} bytes of blocks; correct an endless loop, or divide the program"
 _FUNCTIONS = ("AC", "IC", "DC", "ACP", "ACN")
 
 
@@ -51,7 +47,7 @@ def flatten(
     expand_cycles: bool = False,
     peck_clearance: float | None = None,
     parameters: Mapping[str, float] | None = None,
-    limit: int = UNROLLED_BYTES,
+    limit: int = RUN_BYTES,
 ) -> Unrolled:
     """Plain blocks of a program, with the origin of each.
 
@@ -73,7 +69,7 @@ def flatten(
                 known[name] = None if given is None else Unit.of(given[1], given[0])
         return known[name]
 
-    budget = Budget.of(len(data), least=limit, per_byte=UNROLLED_PER_BYTE, message=_TOO_LONG)
+    budget = Budget.of_run(len(data), limit)
     unit = Unit.of(main, None)
     with contextlib.suppress(Stop):
         Walk(writer.visit, writer.kept, find, budget, block_delete=block_delete).run(
