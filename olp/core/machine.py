@@ -257,6 +257,7 @@ class Mesh:
 class Job:
     """What changes per job. `part_tolerance_um` holds where a call gives none. `work_offsets` and `tools`
     override the machine's, one by one. `start_deg` are positions of rotary axes, of machines that have any.
+    `joint_targets` are axis values (6,) in degrees of positions that the control of an arm knows by a name.
     `payload_centre_mm` counts from the gauge point. `payloads` leads from
     a line of the program, counted from 1, to the payload from there on. `parameters` are values of parameters
     of the program, by names such as "#100". `block_delete` is the position of that switch for programs that
@@ -270,6 +271,7 @@ class Job:
     part_tolerance_um: float | None = None
     start_mm: Place = UNKNOWN
     start_deg: Mapping[str, float] = field(default_factory=dict)
+    joint_targets: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     payload_kg: float = 0.0
     payload_centre_mm: Vector = ZERO
     payloads: Mapping[int, float] = field(default_factory=dict)

@@ -26,8 +26,12 @@ _RUN = b"\n;olp: system data of %b from line %d\n"
 _MARK = pattern(rb"\n;olp: data of ([^\r\n]+)\n")
 _SYSTEM_MARK = pattern(rb"\n;olp: system data of ([^\r\n]+) from line (\d+)\n")
 _LINE_END = pattern(rb"\r\n|\n|\r")
-#: What is read of the data of a control: the frames of tools and bases by their numbers.
-_FRAME = pattern(rb"(?i)[ \t]*(?:TOOL|BASE)_DATA[ \t]*\[")
+#: What is read of the data of a control: the frames of tools and bases by their numbers, and the home
+#: positions.
+_FRAME = pattern(
+    rb"(?i)[ \t]*(?:(?:TOOL|BASE)_DATA[ \t]*\[|"
+    rb"(?:(?:DECL|GLOBAL|CONST)[ \t]+)*(?:E[36])?AXIS[ \t]+XHOME\d*[ \t]*=)"
+)
 
 
 def data_beside(program: Path) -> Path | None:
@@ -56,7 +60,7 @@ def joined(statements: bytes, data: bytes, name: str) -> bytes:
 
 
 def with_system(text: bytes, system: bytes, name: str) -> bytes:
-    """A program with the tools and bases of the control's own data, of a file of this name."""
+    """A program with tools, bases and home positions of the control's own data, of a file of this name."""
     pieces, last = [text], -1
     for number, line in enumerate(_LINE_END.split(system), 1):
         if _FRAME.match(line) is not None:

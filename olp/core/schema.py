@@ -221,6 +221,7 @@ def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
 
 Interval = Annotated[tuple[float, float], After(_ascending)]
 Triple = tuple[float, float, float]
+Six = tuple[float, float, float, float, float, float]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Text = Annotated[str, Field(min_length=1)]

@@ -91,6 +91,10 @@ def read_setup(
         key = ("start_deg",)
         sentence = "start_deg goes with machines that have rotary joints; leave it out"
         problems.append((line_of(key, job_lines), sentence))
+    if job.joint_targets:
+        key = ("joint_targets",)
+        sentence = "joint_targets goes with machines that have rotary joints; leave it out"
+        problems.append((line_of(key, job_lines), sentence))
     for index, mesh in enumerate(job.meshes):
         if mesh.frame != "machine" and setup.work_offset(mesh.frame) is None:
             key = ("meshes", index, "frame")
@@ -243,6 +247,7 @@ def _read_job(path: PathLike, read: Reader, exists: Exists = _is_file) -> tuple[
         part_tolerance_um=file.part_tolerance_um,
         start_mm=file.start_mm.values,
         start_deg=file.start_deg,
+        joint_targets=file.joint_targets,
         payload_kg=file.payload_kg,
         payload_centre_mm=file.payload_centre_mm,
         payloads={entry.line: entry.payload_kg for entry in file.payloads},

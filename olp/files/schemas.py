@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Annotated, Literal
 
 from olp.core.patterns import PARAMETER_NAMES, pattern
-from olp.core.schema import Interval, NotNegative, Position, Positive, Table, Text, Triple
+from olp.core.schema import Interval, NotNegative, Position, Positive, Six, Table, Text, Triple
 from olp.core.schema_keys import Field, Known, refusal, rule
 from olp.files.calibration.schema import CalibrationFile
 from olp.files.fields import (
@@ -468,6 +468,11 @@ class JobFile(Table):
         description="the positions of rotary axes at the start, in degrees, such as { A "
         "= 0.0, C = 0.0 }; only "
         "for machines with rotary joints",
+    )
+    joint_targets: dict[Text, Six] = Field(
+        default={},
+        description="the table [joint_targets]: where an arm is at positions that its control knows by a "
+        "name, such as XHOME = [0.0, -90.0, 90.0, 0.0, 0.0, 0.0]; its axes in their order, in degrees",
     )
     part_tolerance_um: Positive | None = Field(
         default=None,

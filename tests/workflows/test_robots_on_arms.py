@@ -474,6 +474,61 @@ def test_where_the_arm_starts_is_not_where_an_unread_move_left_it(
     assert caught.value.line == place + 2
 
 
+#: Joints between which the fourth axis of a straight move turns far, and those that are nearer do not lead.
+HOME, BEHIND = (11.5, 8.08, 16.37, 52.1, 8.78, 72.2), np.array([29.03, 1.4, 25.45, -68.09, 11.38, 79.31])
+
+
+def homed(folder: Path, table: str = f"XHOME = {list(HOME)}") -> tuple[Path, Path]:
+    """An arm, and a job that states where its home is."""
+    job = folder / "job.toml"
+    job.write_text(f'schema = "olp-job-1"\nmachine = "machine.toml"\n[joint_targets]\n{table}\n')
+    return arm_files(folder), job
+
+
+@pytest.mark.slow
+def test_a_home_that_job_or_control_states_leads_on_to_the_posture_behind_it(tmp_path: Path) -> None:
+    """As if its joints stood in the program, but that it keeps them."""
+    axes = ",".join(f"A{k} {value}" for k, value in enumerate(HOME, 1))
+    machine, job = homed(tmp_path)
+    there = f"LIN {position(BEHIND, '')}"
+    stated = olp.correct_joints(krl_of(f"PTP {{{axes}}}", there), machine).data.splitlines()
+    done = olp.correct_joints(krl_of("PTP xhome", there), machine, job)
+    assert b"PTP xhome" in done.data
+    assert done.data.splitlines()[-2] == stated[-2]
+    assert done.report["moves"]["uncorrected"] == 1
+    for folder in ("R1/Program", "R1/System"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "R1/System/$config.dat").write_text(f"DEFDAT $CONFIG\nE6AXIS XHOME={{{axes}}}\nENDDAT\n")
+    (tmp_path / "R1/Program/made.src").write_bytes(krl_of("PTP XHOME", there))
+    own = olp.correct_joints(tmp_path / "R1/Program/made.src", machine)
+    assert own.data.split(b"\n;olp")[0].splitlines()[-2] == stated[-2]
+    assert any("XHOME is taken as in line 2 of $config.dat" in found.message for found in own.findings)
+    job.write_text(job.read_text().replace("11.5", "11.6"))
+    with pytest.raises(ProgramError, match="XHOME is stated by the control's data and by joint_targets"):
+        olp.correct_joints(tmp_path / "R1/Program/made.src", machine, job)
+
+
+@pytest.mark.parametrize(
+    ("moves", "table"),
+    [
+        (("PTP XHOME", "other()", *KRL_HEAD.decode().splitlines()[1:], "LIN"), ""),
+        (("PTP XHOME", "CIRC"), ""),
+        (("PTP XHOME", "IF $IN[1] THEN", "PTP_REL {X 5}", "ENDIF", "LIN"), ""),
+        (("LOOP", "LIN", "PTP XHOME", "ENDLOOP"), ""),
+        (("PTP XHOME", "PTP XHOME2", "LIN"), ""),
+        (("PTP XHOME2", "PTP {A1 -150}", "LIN"), "XHOME2 = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0]"),
+    ],
+)
+def test_a_home_says_nothing_of_what_the_arm_does_behind_it(
+    moves: tuple[str, ...], table: str, tmp_path: Path
+) -> None:
+    machine, job = homed(tmp_path, *([table] if table else []))
+    near = position(np.array(HOME) + 3.0, "")
+    goes = {"LIN": f"LIN {near}", "CIRC": f"CIRC {position(np.array(HOME) + 1.0, '')}, {near}"}
+    with pytest.raises(ProgramError, match="is reached from the posture before it"):
+        olp.correct_joints(krl_of(*(goes.get(move, move) for move in moves)), machine, job)
+
+
 def test_a_straight_move_to_joints_is_corrected_as_one_that_is_not(tmp_path: Path) -> None:
     text = ur([("J", JOINTS)])
     straight = olp.correct_joints(text.replace(b"movej", b"movel"), arm_files(tmp_path)).data

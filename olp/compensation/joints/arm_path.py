@@ -26,7 +26,7 @@ from olp.kinematics.structure import Structure
 from olp.program.program import Program
 from olp.program.robots.dialect import RobotDialect
 from olp.program.robots.poses import Pose, matrices, matrix
-from olp.program.robots.targets import Target, Use
+from olp.program.robots.targets import Target, Targets, Use
 
 #: Decimals that stand for the axis values, which no text has.
 _DECIMALS = 6
@@ -130,10 +130,17 @@ def arm_path(
     before = path.line[np.maximum(rows - 1, 0)].astype(np.int64)
     wanted = Wanted(
         flange, joints, values, fits, straight, used.mask("free"),
-        np.isnan(config).any(axis=1) | (config.shape[1] == 0), begins, np.where(begins, before, 0), used.line,
+        np.isnan(config).any(axis=1) | (config.shape[1] == 0), begins, np.where(begins, before, 0),
+        _stood(targets, rows, arm), used.mask("led"), used.line,
     )  # fmt: skip
     wordless = np.array([not words for words in used.of("config")], bool)
-    width, settled = len(structure.order), Settled(arm, wanted, postures, travel)
+    width, none_held = len(structure.order), np.array([places[(0.0, 0.0, 0.0)]])
+
+    def reached_at(k: int, own: Array) -> Poses:
+        axes = held.joined(own[None], along[[k]])
+        return held.held(motion.nominal(axes, none_held), axes)
+
+    settled = Settled(arm, wanted, postures, travel, reached_at)
     end = np.full((count, width), np.nan)
     end[rows] = held.joined(settled.axes(held.own(start_deg), wordless), along)
     if settled.left:
@@ -182,6 +189,16 @@ def _refuse_turns(arm: Arm, start: Array, end: Array, straight: Mask, line: Inde
             line=int(line[np.argmax(lost)]),
             code="OLP566",
         )
+
+
+def _stood(targets: Targets, rows: Index, arm: Arm) -> Array:
+    """(n, 6) axis values to which the moves before `rows` go as written; NaN where none are known."""
+    values = np.full((len(rows), AXES), np.nan)
+    for row, move in enumerate(rows.tolist()):
+        own = targets.stood.get(move - 1)
+        if own is not None:
+            values[row, arm.columns] = own
+    return values
 
 
 def _filled(rows: Index, values: Array, count: int) -> Array:

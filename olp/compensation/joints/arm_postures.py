@@ -3,6 +3,8 @@ is straight, else the one that the words of the target name."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
@@ -29,7 +31,8 @@ class Wanted:
     NaN. `values` and `fits` are the postures that their words name (`RobotDialect.fitting`). Moves go
     `straight`, or with any posture near by where they are `free`; `open` ones do not name one posture.
     `begins` are moves whose start is not known, and `behind` is the line of the move that leaves it open:
-    their own where the run decides it. `line` is that of the move."""
+    their own where the run decides it. `stood` (n, 6) are axis values before a move whose start is not known,
+    NaN where they are not, too; those that are `led` go straight from there. `line` is that of the move."""
 
     flange: Poses
     joints: Array
@@ -40,15 +43,21 @@ class Wanted:
     open: Mask
     begins: Mask
     behind: Index
+    stood: Array
+    led: Mask
     line: Index
 
 
 class Settled:
     """The postures of all targets, one after the other. Those in `left` by their numbers have none, for the
-    reasons: the run decides where a move begins, and its language has no word that names a posture."""
+    reasons: the run decides where a move begins, and its language has no word that names a posture.
+    `reached_at` gives the flange of a target by its number at other axis values (6,)."""
 
-    def __init__(self, arm: Arm, wanted: Wanted, postures: Array, travel: Array) -> None:
-        self.arm, self.wanted, self.travel = arm, wanted, travel
+    def __init__(
+        self, arm: Arm, wanted: Wanted, postures: Array, travel: Array,
+        reached_at: Callable[[int, Array], Poses],
+    ) -> None:  # fmt: skip
+        self.arm, self.wanted, self.travel, self.reached_at = arm, wanted, travel, reached_at
         self.postures = postures
         beyond: Mask = (wanted.values < travel[0]) | (wanted.values > travel[1])
         self.fits = wanted.fits & ~beyond.any(axis=2)
@@ -72,7 +81,7 @@ class Settled:
         k = 0
         while k < len(values):
             if begins[k]:
-                last, which, lost = np.full(AXES, np.nan), -1, False
+                last, which, lost = wanted.stood[k], -1, False
             numbers = self._on(k, which, begins)
             if numbers:
                 behind = k + len(numbers)
@@ -140,7 +149,9 @@ class Settled:
             raise _refused("no posture of this arm reaches this target", line)
         known = bool(np.isfinite(last).all())
         if wanted.straight[k] and known:
-            return self._led(k, last, line)
+            return self._led(k, last, line, k - 1)
+        if known and wanted.led[k] and (wanted.free[k] or wanted.open[k]):
+            return self._led(k, last, line, -1)
         if known and (wanted.free[k] or wanted.open[k]):
             found = self._near(k, last, line)
         else:
@@ -151,12 +162,12 @@ class Settled:
             raise straight_wrist(line)
         return found, self._number(k, found)
 
-    def _led(self, k: int, last: Array, line: int) -> tuple[Array, int]:
+    def _led(self, k: int, last: Array, line: int, begin: int) -> tuple[Array, int]:
         """The posture at the end of a straight move that goes a long way, or from a posture whose number is
-        not known."""
+        not known. It begins at a target by its number, or at axis values `last` alone where that is -1."""
         found: Array = nearest(last[None], self.postures[k][None])[0]
-        if np.nanmax(np.abs(found - last)) > _FAR_DEG and k:
-            found = self._followed(k, last)
+        if np.nanmax(np.abs(found - last)) > _FAR_DEG:
+            found = self._followed(k, last, begin)
         if np.isnan(found).any():
             raise straight_wrist(line)
         return found, self._number(k, found)
@@ -191,11 +202,12 @@ class Settled:
             )
         return np.asarray(found)
 
-    def _followed(self, k: int, last: Array) -> Array:
-        """The posture at the end of a long straight move, followed step by step."""
+    def _followed(self, k: int, last: Array, begin: int) -> Array:
+        """The posture at the end of a long straight move (`_led`), followed step by step."""
         share, flange = np.arange(1, _STEPS + 1) / _STEPS, self.wanted.flange
-        ends = [Poses(flange.rotation[[j] * _STEPS], flange.position[[j] * _STEPS]) for j in (k - 1, k)]
-        for postures in self.arm.postures(led(ends[0], ends[1], share)):
+        first = self.reached_at(k, last) if begin < 0 else flange.only(np.array([begin]))
+        end, all_steps = flange.only(np.array([k])), np.zeros(_STEPS, np.int64)
+        for postures in self.arm.postures(led(first.only(all_steps), end.only(all_steps), share)):
             last = nearest(last[None], postures[None])[0]
         return last
 
@@ -211,7 +223,8 @@ class Settled:
         if behind not in (0, line) and (self.wanted.open[k] or (not found and self.wanted.free[k])):
             raise _refused(
                 "the target is reached from the posture before it, and where the move of line "
-                f"{behind} goes is not read; state the configuration, or the numbers of that move",
+                f"{behind} goes is not read; state the configuration, the numbers of that move, or where "
+                "it goes in joint_targets of the job",
                 line,
             )
         if self.wanted.open[k]:

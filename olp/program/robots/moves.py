@@ -38,6 +38,8 @@ NAN = float("nan")
 _SAME_VECTOR_MM = 1e-4
 #: rad by which a via point may be turned from the even turn along its arc, where both could count
 _SAME_ORIENTATION = 1e-3
+#: deg by which joint values that are stated twice may differ
+_SAME_DEG = 1e-6
 #: Statements between two reports of progress.
 _TOLD = 4096
 #: Kinds as the columns of moves have them.
@@ -93,6 +95,7 @@ class RobotMoves:
         self.uses: list[Use | None] = []
         self.arcs: list[Arc] = []
         self.gaps: list[int] = []
+        self._stood: dict[int, tuple[float, ...]] = {}
         #: why moves are left as they are written, and names whose numbers something else needs, in capitals
         self._left: list[DecidedInRun] = []
         self._held: set[str] = set()
@@ -178,7 +181,8 @@ class RobotMoves:
         before = use.turn if self._turn is None else self._turn
         whole |= self.external.moves(target, line) or chord
         pose = self.external.frame(frame, target, line)
-        self.uses.append(use.begun(before, pose, tool.pose, straight=known, whole=whole))
+        led = straight and not known
+        self.uses.append(use.begun(before, pose, tool.pose, straight=known, whole=whole, led=led))
         self.known, self._frame, self._turn, self._rest, self._feed = True, index, use.turn, target.rest, feed
         self._at = frame, tool, use
 
@@ -224,6 +228,8 @@ class RobotMoves:
         self, line: int, uses: tuple[Use, Use], frame: Located, tool: Tool, feed: float, why: str
     ) -> None:
         """Add an arc as its via point and its end, as its path is not known."""
+        # along an arc the posture stays, and which one that is the way would say
+        self._stood.pop(self.count - 1, None)
         self.remark(f"points: {why}", line, f"{why}: it is corrected at its via point and at its end")
         for use in uses:
             self.move(line, use, frame, tool, feed, straight=False, whole=True)
@@ -270,14 +276,14 @@ class RobotMoves:
 
     def joint_move(
         self, line: int, taken: Callable[[], Use | None], *, straight: bool = False,
-        tool: Tool | None = None, feed: float = NAN, whole: bool = False,
+        tool: Tool | None = None, feed: float = NAN, whole: bool = False, stands: tuple[float, ...] = (),
     ) -> None:  # fmt: skip
         """Add a move to joint values; `straight` where it leads the tip of its `tool` along a line, `whole`
         where that is never split. Where the machine is no arm, or `taken` finds no numbers in the text, it
-        stays as it is, and where the robot is then is not known."""
+        stays as it is, and where the robot is then is not known, unless it `stands` at joint values."""
         use = taken() if self.arm else None
         if use is None:
-            self.left(line)
+            self.left(line, stands)
             self.remark("joints", line, "joint values are kept as written")
             return
         if not self.known:
@@ -304,13 +310,16 @@ class RobotMoves:
             self.gaps.append(self.count)
             self._open(line, max(self._frame, 0))
 
-    def left(self, line: int) -> None:
+    def left(self, line: int, stands: tuple[float, ...] = ()) -> None:
         """A move stays as it is written, and where it goes is not stated. On an arm it is one of the moves,
-        so that it is listed as uncorrected, and nothing before it says where the arm is."""
+        so that it is listed as uncorrected, and nothing before it says where the arm is. Then it `stands` at
+        joint values (6,) in degrees, where these are known."""
         if not self.arm:
             self.known = False
             return
         self.known, self._turn, self._rest = True, None, ()
+        if stands:
+            self._stood[self.count] = stands
         self._open(line, self._flange(line))
 
     def decided(self, error: DecidedInRun) -> None:
@@ -319,6 +328,20 @@ class RobotMoves:
         self.left(error.line)
         self._left.append(error)
         self.remark(f"left: {error.message}", error.line, f"left as written: {error.message}")
+
+    def stated_joints(self, name: str, own: tuple[float, ...], line: int) -> tuple[float, ...]:
+        """The joint values (6,) in degrees of a position that the control knows by a name: its `own`, or
+        those of the job; none where neither states them. Raises ProgramError where they differ."""
+        given = {key.casefold(): values for key, values in self.setup.job.joint_targets.items()}
+        stated = given.get(name.casefold(), ())
+        if own and stated and any(abs(a - b) > _SAME_DEG for a, b in zip(own, stated, strict=True)):
+            raise ProgramError(
+                f"the position {name} is stated by the control's data and by joint_targets of the job, and "
+                "they differ; state it once, or the same",
+                line=line,
+                code="OLP523",
+            )
+        return own or stated
 
     def hold(self, names: Iterable[str]) -> None:
         """Targets of these names keep their numbers, as something else than corrected moves has them."""
@@ -373,7 +396,7 @@ class RobotMoves:
                 else target
                 for target in own
             ]
-        targets = Targets(tuple(own), tuple(self.uses), tuple(self.arcs), tuple(self.gaps))
+        targets = Targets(tuple(own), tuple(self.uses), tuple(self.arcs), tuple(self.gaps), self._stood)
         return replace(program, targets=targets)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import field
+
 from olp.core.machine import ZERO, Vector
 from olp.core.values import dataclass
 from olp.program.robots.poses import NO_TURN, Pose, Quaternion
@@ -72,8 +75,9 @@ class Use:
     bytes of the three numbers of its shift, empty where it has none, along axes turned by `offset_turn`,
     which are those of the tool where it is `along_tool`. `frame` is the pose of the target's frame in machine
     coordinates, and `tool` that of the tip at the flange, None where the program does not state it. The
-    robot goes `straight` from a known target, or with any posture that is near where it is `free`. A move
-    that is `whole` is never split. Where a track carries the arm, `frame` counts from its carriage."""
+    robot goes `straight` from a known target, or is `led` straight from where no target says it is, or goes
+    with any posture that is near where it is `free`. A move that is `whole` is never split. Where a track
+    carries the arm, `frame` counts from its carriage."""
 
     target: int
     statement: Span
@@ -91,14 +95,15 @@ class Use:
     straight: bool = False
     free: bool = False
     whole: bool = False
+    led: bool = False
 
     def begun(
-        self, before: Quaternion, frame: Pose, tool: Pose | None, *, straight: bool, whole: bool
+        self, before: Quaternion, frame: Pose, tool: Pose | None, *, straight: bool, whole: bool, led: bool
     ) -> Use:
         """The same with where it begins, in its frame and with its tool."""
         return Use(
             self.target, self.statement, self.place, self.named, self.shift_mm, self.turn, before, self.zone,
-            self.offsets, self.offset_turn, self.along_tool, frame, tool, straight, self.free, whole,
+            self.offsets, self.offset_turn, self.along_tool, frame, tool, straight, self.free, whole, led,
         )  # fmt: skip
 
 
@@ -119,12 +124,14 @@ class Arc:
 class Targets:
     """All targets of a program, and (n,) what each of its moves uses; None for a move that the text does not
     state as a target. `arcs` are those among the moves, in their order, and `gaps` the moves that no
-    statement makes: before the next one the machine may have gone anywhere."""
+    statement makes: before the next one the machine may have gone anywhere. `stood` are moves that are left
+    as written, with the joint values to which they go, in degrees."""
 
     targets: tuple[Target, ...]
     uses: tuple[Use | None, ...]
     arcs: tuple[Arc, ...] = ()
     gaps: tuple[int, ...] = ()
+    stood: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

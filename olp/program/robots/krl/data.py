@@ -155,6 +155,14 @@ class Declared:
         self._single[key] = found[0], numbers
         return found[0], numbers
 
+    def system_value(self, key: str, line: int) -> Aggregate | None:
+        """The numbers that the control's own data state for a name, None where they state none."""
+        found = self._system.get(key, [])
+        numbers = self.aggregate(found[0].span) if len(found) == 1 else None
+        if numbers is not None:
+            self.taken.setdefault(key, (line, place_of(self.data, found[0].line.line)))
+        return numbers
+
     def aggregate(self, span: Span) -> Aggregate | None:
         """The aggregate that bytes are (`text.aggregate`), which is read once."""
         if span not in self._aggregates:

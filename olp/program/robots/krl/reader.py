@@ -241,8 +241,12 @@ class _Reader:
             self._arc(line, target, state, words.zone, by_via=word == b"SCIRC")
             return
         stated = self._stated(terms[0], line) if len(terms) == 1 else None
-        if self._at_home(terms) if stated is None else stated.numbers.joints:
-            self.moves.joint_move(line.line, lambda: self._joints(terms[0], stated, words.zone, line))
+        home = self._home(terms) if stated is None else ""
+        if home or (stated is not None and stated.numbers.joints):
+            self.moves.joint_move(
+                line.line, lambda: self._joints(terms[0], stated, words.zone, line),
+                stands=self._stands(home, line),
+            )  # fmt: skip
             return
         base = self.active.base(state, line.line)
         use, frame = self._use(line, target, terms, stated, base, words.zone)
@@ -289,10 +293,19 @@ class _Reader:
             return None
         return _Stated(*self._position(name[1], name[2], line), name)
 
-    def _at_home(self, terms: list[Span]) -> bool:
-        """Whether a move goes to the home position, whose joints the control knows."""
+    def _home(self, terms: list[Span]) -> str:
+        """The name of the home position to which a move goes, whose joints the control knows; else empty."""
         name = _NAME.fullmatch(self.data, *terms[0]) if len(terms) == 1 else None
-        return name is not None and _HOME.fullmatch(key_of(name[1], name[2]).encode("latin-1")) is not None
+        key = "" if name is None else key_of(name[1], name[2])
+        known = {stated.upper() for stated in self.moves.setup.job.joint_targets}
+        return key if key in known or _HOME.fullmatch(key.encode("latin-1")) else ""
+
+    def _stands(self, home: str, line: Line) -> tuple[float, ...]:
+        """The joint values of a home position, of the control's own data or of the job; none where neither
+        states them."""
+        own = self.declared.system_value(home, line.line) if home else None
+        joints = () if own is None or not (own.joints and own.whole) else own.numbers[SIX]
+        return self.moves.stated_joints(home, joints, line.line)
 
     def _joints(self, span: Span, stated: _Stated | None, zone: Span, line: Line) -> Use | None:
         """How a move uses joint values; None where the text does not state all six."""

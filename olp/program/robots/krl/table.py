@@ -48,7 +48,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"a call": (_R, "may move, and set base and tool: these have to be set again"),
     b"TRIGGER": (_R, "the move behind it is never split"),
     b"$POS_ACT, $AXIS_ACT": (_X, "a move to them goes nowhere"),
-    b"XHOME": (_X, "joint values of the control's own data"),
+    b"XHOME": (_X, "joint values of the control's own data, or of `joint_targets` of the job"),
     b"WAIT, $OUT, HALT, INTERRUPT, ON_ERROR_PROCEED": (_X, ""),
     b"other assignments": (_X, "unless they change a position or frame that a move uses: then refused"),
     b"CIRC, SCIRC": (_C, "an arc through a position to another one; several arcs where one would bend"),
