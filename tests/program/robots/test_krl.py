@@ -123,6 +123,13 @@ REFUSED = {
     f"$TOOL={P}\n$BASE={P}\np={P}\np.X=5\nLIN p": "another value in line 5",
     f"$TOOL={P}\n$BASE={P}\np[1]={P}\np[i]={P}\nLIN p[1]": "another value in line 5",
     f"$TOOL={P}\n$BASE={P}\np={P}\nteach(p)\n$TOOL={P}\n$BASE={P}\nLIN p": "another value in line 5",
+    f"$TOOL={P}\n$BASE={P}\np[1]={P}\np[i[2]].X=5\nLIN p[1]": "another value in line 5",
+    f"$TOOL={P}\n$BASE={P}\np={P}\nr=EKI_GetReal(a,b,p.X)\nLIN p": "another value in line 5",
+    f"p={P}\nteach(p.X)\n$TOOL={P}\n$BASE={P}\nLIN p": "another value in line 3",
+    f"p[1]={P}\nteach(f(p[1].X),3)\n$TOOL={P}\n$BASE={P}\nLIN p[1]": "another value in line 3",
+    f"$TOOL={P}\n$BASE={P}\np={P}\nTRIGGER WHEN DISTANCE=0 DELAY=0 DO p.X=5\nLIN p": "value in line 5",
+    f"p={P}\nEND\nDEF go(p:IN)\n$TOOL={P}\n$BASE={P}\nLIN p": "another value in line 4",
+    f"DECL E6POS d\n$TOOL={P}\n$BASE={P}\nLIN d": "another value in line 2",
     f"$TOOL={P}\n$BASE={P}\np=q\nLIN p": "not stated with its numbers in line 4",
     f"$TOOL={P}\n$BASE={P}\nLIN p[i]": "chosen in the run",
     f"$TOOL={P}\n$BASE={P}\nLIN {{X 1}}": "lacks one of",
@@ -143,13 +150,22 @@ REFUSED = {
 @pytest.mark.parametrize(("statements", "why"), REFUSED.items())
 def test_what_is_not_certain_is_refused_with_its_line(zero: Path, statements: str, why: str) -> None:
     text = (
-        f"DEF a()\n{statements}\nEND\nDEFDAT a\nDECL FDAT f={{TOOL_NO 1,BASE_NO 1,IPO_FRAME #TCP}}\nENDDAT\n"
+        f"DEF a()\n{statements}\nEND\nDEFDAT a\nDECL FDAT f={{TOOL_NO 1,BASE_NO 1,IPO_FRAME #TCP}}\n"
+        f"E6POS d={P}\nENDDAT\n"
     )
     with pytest.raises(OlpError, match=why) as error:
         olp.correct(text.encode(), zero)
     assert isinstance(error.value, ProgramError)
     assert error.value.line is not None
     assert 2 <= error.value.line <= 9
+
+
+def test_what_a_routine_takes_by_value_it_does_not_change(zero: Path) -> None:
+    frames = f"$TOOL={P}\n$BASE={P}\n"
+    text = f"DEF a()\np={P}\nshow(p.X)\n{frames}LIN p\nEND\nDEF show(x:IN, y [] : in)\nEND\n"
+    assert olp.correct(text.encode(), zero).report["moves"]["total"] == 1
+    with pytest.raises(ProgramError, match="another value in line 3"):
+        olp.correct(text.replace(": in)", ": out)").encode(), zero)
 
 
 def test_taught_points_have_their_own_base_and_tool(tmp_path: Path) -> None:

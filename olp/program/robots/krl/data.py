@@ -19,9 +19,18 @@ _PLAIN = rb"(?:INT|REAL|BOOL|CHAR|FRAME|POS|E3POS|E6POS|AXIS|E3AXIS|E6AXIS|SIGNA
 _DECLARED = pattern(rb"(?i)(?:" + _LEAD + rb"|" + _PLAIN + rb")(?=[A-Z_$])")
 _OTHER = pattern(rb"(?i)(?:GLOBAL\s+)?(?:EXT|EXTFCT|STRUC|ENUM|SIGNAL|IMPORT|CHANNEL)\b")
 _VALUE = pattern(rb"([\w$]+)\s*(?:\[([^\]]*)\])?\s*(?:=\s*(.*))?", re.DOTALL)
+#: What stands in the brackets of an index; it may itself have one.
+_INDEX = rb"(?:[^\[\]]|\[[^\[\]]*\])*"
 _ASSIGNED = pattern(
-    rb"([\w$]+)\s*(?:\[([^\]]*)\])?\s*((?:\.\s*[\w$]+\s*(?:\[[^\]]*\])?\s*)*)=(?!=)\s*(.*)", re.DOTALL
+    rb"([\w$]+)\s*(?:\[("
+    + _INDEX
+    + rb")\])?\s*((?:\.\s*[\w$]+\s*(?:\["
+    + _INDEX
+    + rb"\])?\s*)*)=(?!=)\s*(.*)",
+    re.DOTALL,
 )
+#: What a trigger gives another value while the robot goes on.
+_BEHIND = pattern(rb"(?i)TRIGGER\b.*\bDO\s+(\w+)[^=]*=(?!=)")
 #: The first words of both.
 _DECLARING = frozenset(
     (b"GLOBAL", b"DECL", b"CONST", b"INT", b"REAL", b"BOOL", b"CHAR", b"FRAME", b"POS", b"E3POS", b"E6POS",
@@ -86,6 +95,8 @@ class Declared:
         self.changed: dict[str, int] = {}
         self.taken: dict[str, tuple[int, str]] = {}
         self._system: dict[str, list[Value]] = {}
+        #: names that a routine declares as its own, without a value, with their lines
+        self._own: dict[str, int] = {}
         self._own_end = own_end(data)
         self._single: dict[str, tuple[Value, Aggregate]] = {}
         self._aggregates: dict[Span, Aggregate | None] = {}
@@ -101,23 +112,29 @@ class Declared:
         head = _DECLARED.match(line.text) if line.word in _DECLARING else None
         if head is None and b"=" not in line.text:
             return
+        behind = _BEHIND.match(line.text) if line.word == b"TRIGGER" else None
+        if behind is not None:
+            self.changed.setdefault(key_of(behind[1], None), line.line)
+            return
         place = 0 if head is None else head.end()
         match = assigned(line.text) if head is None else _VALUE.fullmatch(line.text, place)
         if match is None:
             return
         value = 4 if head is None else 3
+        if head is not None and match[value] is None and not listed:
+            self._own.setdefault(key_of(match[1], None), line.line)
         if match[value] is None or (head is None and match[1][:1] == b"$"):
             return
         key, span = key_of(match[1], match[2]), match.span(value)
+        if match[2] is not None and not match[2].strip().isdigit():
+            # any element of the array
+            self.changed.setdefault(key_of(match[1], None), line.line)
         if head is None and match[3].strip():
             self.changed.setdefault(key, line.line)
             return
         own = (line.begin + span[0], line.begin + span[1])
         values = self.values if line.begin < self._own_end else self._system
         values.setdefault(key, []).append(Value(line, own, listed))
-        if match[2] is not None and not match[2].strip().isdigit():
-            # any element of the array
-            self.changed.setdefault(key_of(match[1], None), line.line)
 
     def change(self, name: bytes, line: int) -> None:
         """A call may give a name another value."""
@@ -136,6 +153,9 @@ class Declared:
         again = self.changed.get(key) or self.changed.get(array)
         if len({self.data[slice(*value.span)] for value in found}) > 1:
             again = found[1].line.line
+        if again is None and any(value.listed for value in found):
+            # one of the same name in a routine is another one
+            again = self._own.get(array)
         if again is not None:
             raise DecidedInRun(
                 f"{what} {key} gets another value in {place_of(self.data, again)}, so its value here depends "

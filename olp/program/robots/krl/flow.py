@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
-from olp.program.robots.krl.table import STILL
+from olp.program.robots.krl.table import STILL, WRITING
 from olp.program.robots.krl.text import Line
 
 _ROUTINE = pattern(rb"(?i)(?:GLOBAL\s+)?DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)\s*\(")
@@ -30,7 +30,9 @@ _BLOCKS = _ROUTINES | frozenset(
     (b"DEFDAT", b"ENDDAT", b"END", b"ENDFCT", b"IF", b"SWITCH", b"FOR", b"WHILE", b"REPEAT", b"LOOP", b"ELSE",
      b"CASE", b"DEFAULT", b"ENDIF", b"ENDSWITCH", b"ENDFOR", b"ENDWHILE", b"UNTIL", b"ENDLOOP")
 )  # fmt: skip
-_ARGUMENT = pattern(rb"[(,]\s*([A-Za-z]\w*)\s*(?:\[[^\]]*\]\s*)?(?=[,)])")
+#: A name, an element, or a component of one.
+_ARGUMENT = pattern(rb"[(,]\s*([A-Za-z]\w*)\s*(?:\[[^\]]*\]\s*)?(?:\.\s*\w+\s*(?:\[[^\]]*\]\s*)?)*(?=[,)])")
+_PARAMETER = pattern(rb"(?i)\s*(\w+)\s*(?:\[[\s,]*\]\s*)?(?::\s*(IN|OUT)\s*)?")
 _STRING = pattern(rb'"[^"]*"')
 
 
@@ -39,6 +41,7 @@ class _Routine:
     moves: bool
     sets: bool
     calls: set[bytes]
+    by_value: bool
 
 
 def routine_of(line: Line) -> bytes:
@@ -58,17 +61,21 @@ def sets_frames(line: Line) -> bool:
     return begins and _SETS.match(line.text) is not None
 
 
+def _called(text: bytes) -> list[bytes]:
+    """The names before brackets, in capitals."""
+    return [name.upper() for name in _CALL.findall(_STRING.sub(b"", text))] if b"(" in text else []
+
+
 def calls_in(text: bytes) -> list[bytes]:
     """The routines that a statement calls, in capitals, but for those that do nothing to the path."""
-    if b"(" not in text:
-        return []
-    names = (name.upper() for name in _CALL.findall(_STRING.sub(b"", text)))
-    return [name for name in names if name not in STILL]
+    return [name for name in _called(text) if name not in STILL]
 
 
-def arguments_in(text: bytes) -> list[bytes]:
-    """The names that stand alone as arguments of calls."""
-    return _ARGUMENT.findall(_STRING.sub(b"", text))
+def parameters_of(line: Line) -> list[tuple[bytes, bool]]:
+    """The parameters of a routine that a line begins, in capitals, and whether callers give them by value."""
+    given = line.text.partition(b"(")[2].rpartition(b")")[0]
+    matches = map(_PARAMETER.fullmatch, given.split(b","))
+    return [(match[1].upper(), (match[2] or b"").upper() == b"IN") for match in matches if match is not None]
 
 
 class Flow:
@@ -80,7 +87,9 @@ class Flow:
         for line in lines:
             name = routine_of(line)
             if name:
-                current = self._routines[name] = _Routine(moves=False, sets=False, calls=set())
+                current = self._routines[name] = _Routine(
+                    moves=False, sets=False, calls=set(), by_value=all(own for _, own in parameters_of(line))
+                )
             elif current is not None:
                 current.moves |= line.word in _MOVES
                 current.sets |= sets_frames(line)
@@ -103,6 +112,13 @@ class Flow:
 
     def known(self, name: bytes) -> bool:
         return name in self._routines
+
+    def changed_in(self, text: bytes) -> list[bytes]:
+        """The names of data that a statement gives to routines which may change them."""
+        changing = (name for name in _called(text) if name in WRITING or name not in STILL)
+        if all(name in self._routines and self._routines[name].by_value for name in changing):
+            return []
+        return _ARGUMENT.findall(_STRING.sub(b"", text))
 
     def moves(self, name: bytes) -> bool:
         """Whether a routine may move the robot."""

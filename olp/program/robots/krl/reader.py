@@ -110,12 +110,13 @@ class _Reader:
         self.moves.hold(self.declared.taken)
 
     def _mentioned(self, line: Line) -> None:
-        """A routine may give its arguments other values."""
-        for name in flow.calls_in(line.text):
-            if name == b"BAS" or flow.routine_of(line) or declares(line):
-                continue
-            for argument in flow.arguments_in(line.text):
-                self.declared.change(argument, line.line)
+        """A routine may give its arguments other values, and its parameters hide data of the same name."""
+        if flow.routine_of(line):
+            changed = [name for name, _ in flow.parameters_of(line)]
+        else:
+            changed = [] if line.word == b"BAS" or declares(line) else self.flow.changed_in(line.text)
+        for name in changed:
+            self.declared.change(name, line.line)
 
     # -- statements ----------------------------------------------------------------------------------
 

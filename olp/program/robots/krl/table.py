@@ -27,6 +27,12 @@ STILL = frozenset(
      b"FOR", b"B_AND", b"B_OR", b"B_EXOR", b"B_NOT", b"TO", b"THEN", b"BY", b"MBX_REC")
 )  # fmt: skip
 
+#: Those among them that give an argument another value.
+WRITING = frozenset(
+    (b"CREAD", b"SREAD", b"EKI_GETREAL", b"EKI_GETINT", b"EKI_GETBOOL", b"EKI_GETFRAME", b"EKI_GETSTRING",
+     b"STRTOINT", b"STRTOREAL", b"STRTOBOOL", b"GET_SYSTEM_DATA", b"MBX_REC")
+)  # fmt: skip
+
 TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"LIN, SLIN": (_C, "a straight move to {...}, a name of one, or a product (:) of them"),
     b"PTP, SPTP": (_C, "corrected at its end; the path of the joints is not judged"),
