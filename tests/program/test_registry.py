@@ -100,12 +100,17 @@ SIGNS = {
         "MODE/MAN", "MODE / PROG,MAN", "MODE/AUTO", "F(A)=FEAT/1", "F(A b) = FEAT/1", "FEDRAT/POSVEL,1",
         "FEDRAT / MESVEL,1",
     ),
+    "urscript": (
+        "def a():", "def pallet(x, y):  # rows", "thread b() :", "global v = 1", " local y = p[1]",
+        "while (x < 3):", "elif x: # no", "if a:\r",
+    ),
 }  # fmt: skip
 #: lines that no dialect of statements has alone
 NO_SIGNS = (
     "LOAD 1", "FINISH", "RAPID A", "RAPID/5", "FEDRAT/A", "CIRCLE 1", "CYCLE 1", "UNITS MM", "UNIT/MM,X",
     "GOTO 1",
     "GOTO/1,2,3", "GOTO/A,2,3,0,0,1", "MEAS", "MODE/OFF", "F(A)=5", "X PARTNO", "(PARTNO)", "G0 X1 FINI",
+    "if a: b", "IF X", "global = 2",
 )  # fmt: skip
 
 

@@ -98,7 +98,8 @@ LS = Signs(
 URSCRIPT = Signs(
     ("script", "urscript"),
     own=pattern(
-        rb"(?im)^[ \t]*(?:def[ \t]+\w+\(\):|"
+        rb"(?im)^[ \t]*(?:(?:def|thread)[ \t]+\w+[ \t]*\([^():\r\n]*\)[ \t]*:|"
+        rb"(?:global|local)[ \t]+\w+[ \t]*=|(?:if|elif|while)\b[^\r\n]*:[ \t]*(?:#[^\r\n]*)?\r?$|"
         rb"(?:movej|movel|movep|movec|servoj|set_tcp)[ \t]*\([ \t]*(?:p?\[|pose_|get_))"
     ),
 )

@@ -131,6 +131,24 @@ def test_a_statement_goes_on_until_its_brackets_are_closed(bent: Path) -> None:
     assert "and  # (a\n    n > 0):" in done
 
 
+def test_calls_in_one_line_are_statements_of_their_own(bent: Path) -> None:
+    """As the control reads them, which looks for no ends of lines behind calls."""
+    frame = "p[0.3,0.25,-0.3,0,0,0]"
+    one = (
+        f"  movej(pose_trans({frame},p[-0.06,-0.06,0,2.2,2.2,0.1]),a=1,v=1)   sleep(0.5)  # wait\n"
+        f"  movel(pose_trans({frame},p[0.06,0.06,0.02,2.2,2.2,0.1])) movel(Q, r=0.01) Q[0]=0.5\n"
+    )
+    names = f"  Q=p[0.29,0.22,-0.28,{TURN}]\n"
+    plain = one.replace("   sleep", "\n  sleep").replace(") movel", ")\n  movel").replace(") Q[", ")\n  Q[")
+    both = [olp.correct((HEAD + names + text + "end\n").encode(), bent) for text in (one, plain)]
+    assert both[0].report["moves"] == both[1].report["moves"]
+    assert both[0].report["moves"]["split"] == 2
+    wanted, done = (ur.moves(re.sub(rb"\)[ ]+(?=[mQs])", b")\n", each.data)) for each in both)
+    assert [move.tip.tolist() for move in wanted] == [move.tip.tolist() for move in done]
+    with pytest.raises(OlpError, match="write it in a line of its own"):
+        olp.correct((HEAD + "  movel(p[0,0,0,0,0,0]) and x\nend\n").encode(), bent)
+
+
 SET = "set_tcp(p[0,0,0.1,0,0,0])\n"
 MOVE = "movel(p[0.1,0.2,-0.3,0,0,0])\n"
 

@@ -22,7 +22,7 @@ from olp.program.robots.targets import NOWHERE, Span, Use
 from olp.program.robots.urscript.calls import Calls
 from olp.program.robots.urscript.named import ASSIGNED, ELEMENT, Names
 from olp.program.robots.urscript.table import LEFT, TABLE
-from olp.program.robots.urscript.text import Line, lines_of
+from olp.program.robots.urscript.text import Line, closed, lines_of
 from olp.program.robots.urscript.tools import Tools
 from olp.program.text.numbers import LARGEST
 
@@ -42,6 +42,8 @@ _CALL = pattern(rb"\s*([A-Za-z_]\w*)\s*\((.*)\)\s*")
 _NAME = pattern(rb"\s*([A-Za-z_]\w*)\s*")
 _ARGUMENT = pattern(rb"(?:[^,\[\]()]|\[[^\[\]]*\]|\((?:[^()]|\([^()]*\))*\))+")
 _NAMED = pattern(rb"\s*([atvr]|mode)\s*=(?!=)\s*(.*?)\s*")
+#: Statements that are read as calls.
+_ALONE = (b"movel", b"movep", b"movej", b"movec", b"set_tcp")
 #: Words of moves behind their targets, in their order, where that is not the usual one.
 _ORDERS = {b"movep": ("a", "v", "r"), b"movec": ("a", "v", "r", "mode")}
 _NUMBER = pattern(rb"\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
@@ -126,6 +128,9 @@ class _Reader:
             raise DecidedInRun(f"{word.decode()} {LEFT[word]}", line=line.line, code="OLP512")
         if row is not None and row[0] is Support.REFUSED:
             raise ProgramError(f"{word.decode()} {row[1]}", line=line.line, code="OLP512")
+        if word in _ALONE and (call is None or closed(text) < len(text)):
+            what = "something else stands in the line of this statement; write it in a line of its own"
+            raise ProgramError(what, line=line.line, code="OLP510")
         if call is not None and word in (b"movel", b"movep", b"movej"):
             self._move(line, call)
         elif call is not None and word == b"movec":
