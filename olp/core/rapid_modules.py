@@ -26,7 +26,8 @@ _DECLARED = pattern(
 )
 _WORD = pattern(rb"[A-Za-z]\w*")
 #: A name that gets a value.
-GIVEN = pattern(rb"(?<![\\\w.}])([A-Za-z]\w*)\s*(?:\{[^}]*\})?(?:\.\w+)*\s*:=")
+_INDEX = rb"(?:\s*\{(?:[^{}]|\{[^{}]*\})*\})?"
+GIVEN = pattern(rb"(?<![\\\w.}])([A-Za-z]\w*)" + _INDEX + rb"(?:\s*\.\s*\w+" + _INDEX + rb")*\s*:=")
 _TARGETS = frozenset((b"ROBTARGET", b"JOINTTARGET"))
 
 

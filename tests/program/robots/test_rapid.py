@@ -278,6 +278,15 @@ def test_data_that_get_their_only_value_later_have_that(bent: Path, zero: Path) 
         ("VAR robtarget a;", "a:=Offs(p,1,2,3);", "a"),
         ("VAR robtarget a;\nVAR robtarget b;", "a:=b;\nb:=a;", "a"),
         ("VAR robtarget a;", "a:=p;\na.trans.z:=3;", "a"),
+        (f"VAR robtarget a:=[[1,2,3],{TAIL};", "Add a.trans.z,5;", "a"),
+        (f"VAR robtarget a:=[[1,2,3],{TAIL};", "Teach 1,a.trans.x\\Slow;", "a"),
+        (f"VAR robtarget a:=[[1,2,3],{TAIL};", "ok:=StrToVal(s,a.trans.x);", "a"),
+        (f"VAR robtarget a:=[[1,2,3],{TAIL};", "IF StrToVal(StrPart(s,1,3),a) THEN\nENDIF", "a"),
+        (f"VAR robtarget a{{1}}:=[[[1,2,3],{TAIL}];", "a{i{1}}.trans.x:=5;", "a{1}"),
+        (
+            f"FUNC num f(num k,INOUT num v)\nENDFUNC\nVAR robtarget a:=[[1,2,3],{TAIL};",
+            "IF f(1,a.trans.z)>3 RETURN;", "a",
+        ),
     ],
 )  # fmt: skip
 def test_data_that_may_have_another_value_are_refused(
@@ -287,6 +296,12 @@ def test_data_that_may_have_another_value_are_refused(
     text += f"PROC main()\n{given}\nMoveJ {moved},v100,fine,tool0;\n"
     with pytest.raises(ProgramError, match="gets another value in line"):
         olp.correct(text.encode() + MACHINE_TAIL, zero)
+
+
+def test_a_function_that_takes_a_component_by_value_changes_nothing(zero: Path) -> None:
+    text = f"{HEAD}VAR robtarget a:=[[250,200,-100],{TAIL};\nFUNC num f(num k,num v)\nENDFUNC\nPROC main()\n"
+    text += "SetAO ao,a.trans.x;\nb:=f(1,a.trans.z);\nMoveJ a,v100,fine,tool0;\n"
+    assert olp.correct(text.encode() + MACHINE_TAIL, zero).report["moves"]["total"] == 1
 
 
 def test_a_target_of_another_routine_is_not_named_where_nothing_sees_it(zero: Path) -> None:

@@ -131,6 +131,7 @@ def test_a_statement_goes_on_until_its_brackets_are_closed(bent: Path) -> None:
     assert "and  # (a\n    n > 0):" in done
 
 
+@pytest.mark.slow
 def test_calls_in_one_line_are_statements_of_their_own(bent: Path) -> None:
     """As the control reads them, which looks for no ends of lines behind calls."""
     frame = "p[0.3,0.25,-0.3,0,0,0]"

@@ -30,12 +30,25 @@ _HARMLESS_TAIL = pattern(
 _NAMES = pattern(rb"[A-Za-z]\w*")
 #: Names that stand alone as arguments.
 _MENTIONED = pattern(rb"(?:^|[\s,(])([A-Za-z]\w*)\s*(?=,|$)")
+#: The same, and components and elements of data.
+_PARTLY_MENTIONED = pattern(
+    rb"(?:^|[\s,(=])([A-Za-z]\w*)\s*(?:\{[^}]*\}\s*)?(?:\.\s*\w+\s*(?:\{[^}]*\}\s*)?)*(?=[,\\]|$)"
+)
+#: Instructions that give components of data another value.
+_WRITING = frozenset(
+    (b"ADD", b"INCR", b"DECR", b"CLEAR", b"TPREADNUM", b"TPREADDNUM", b"TPREADFK", b"READANYBIN",
+     b"UNPACKRAWBYTES", b"READRAWBYTES", b"GETDATAVAL", b"GETSYSDATA", b"BITSET", b"BITCLEAR")
+)  # fmt: skip
+#: Functions of the control that change an argument, as `changing_parameters`.
+_WRITING_FUNCTIONS = {b"STRTOVAL": [False, True]}
+_FUNCTION = pattern(rb"(?<![\w.\\])([A-Za-z]\w*)\s*\(")
 #: The second argument of a search: where it writes what it has found.
 _FOUND = pattern(rb"\A[^,]*(?:,\s*\\[^,]*)*,\s*([A-Za-z]\w*)")
 #: An assignment to a whole datum.
 _WHOLE = pattern(rb"(?s)\s*[A-Za-z]\w*\s*:=\s*(.*?)\s*")
 _AREA = pattern(rb"(?i)\s*SingArea\b[^\\]*\\\s*(Wrist|LockAxis4)")
 _ARC_MODE = pattern(rb"(?i)\s*CirPathMode\b[^\\]*\\\s*(CirPointOri|Wrist\w*)")
+_OPENING, _CLOSING = b"()"
 #: The word of a short IF.
 IF = b"IF"
 #: What a short IF must not hold.
@@ -59,15 +72,15 @@ def changing_parameters(statements: Iterable[Statement]) -> dict[bytes, list[boo
     is not optional, in any of its declarations."""
     found: dict[bytes, list[bool]] = {}
     for statement in statements:
-        match = _PROC.match(statement.text) if statement.block == "routine" else None
-        if match is None:
+        if statement.block != "routine":
             continue
+        name = routine_of(statement).encode("latin-1")
         parts = _PART.findall(statement.text.partition(b"(")[2].rpartition(b")")[0])
         own = [_CHANGING.match(part) is not None for part in parts if part.strip()[:1] != b"\\"]
-        known = found.setdefault(match[1].upper(), own)
+        known = found.setdefault(name, own)
         if known is not own:
             both = zip_longest(known, own, fillvalue=True)
-            found[match[1].upper()] = [a or b for a, b in both]
+            found[name] = [a or b for a, b in both]
     return found
 
 
@@ -82,6 +95,27 @@ def _arguments(text: bytes, changing: list[bool]) -> list[bytes]:
                 names += _NAMES.findall(own)
             place += 1
     return names
+
+
+def _given_to_functions(text: bytes, changing: Mapping[bytes, list[bool]]) -> list[bytes]:
+    """The names that a statement gives to functions which may change them."""
+    names: list[bytes] = []
+    for match in _FUNCTION.finditer(text) if b"(" in text else ():
+        name = match[1].upper()
+        own = _WRITING_FUNCTIONS.get(name) or changing.get(name, [])
+        if any(own):
+            names += _arguments(_inside(text, match.end()), own)
+    return names
+
+
+def _inside(text: bytes, begin: int) -> bytes:
+    """What stands between a bracket before byte `begin` and the one that closes it."""
+    depth = 1
+    for place, byte in enumerate(text[begin:], begin):
+        depth += (byte == _OPENING) - (byte == _CLOSING)
+        if depth == 0:
+            return text[begin:place]
+    return text[begin:]
 
 
 def area_of(statement: Statement) -> str:
@@ -157,22 +191,26 @@ def value_in(statement: Statement) -> Span | None:
 
 def given_in(statement: Statement, changing: Mapping[bytes, list[bool]]) -> list[str]:
     """The names that may get another value in a statement, in capitals: those that it assigns, and what it
-    gives to a routine or an instruction. A move changes no data but the point that a search has found.
-    `changing` are routines of the text, as `changing_parameters` has them."""
+    gives to a routine, a function or an instruction. A move changes no data but the point that a search has
+    found. `changing` are routines of the text, as `changing_parameters` has them."""
     text, word = statement.text, statement.word
+    names = [] if statement.block == "routine" else _given_to_functions(text, changing)
+    if statement.block:
+        return [name.decode("latin-1").upper() for name in names]
     inner = inner_move(statement) if word == IF else None
     if inner is not None:
         return given_in(inner, changing)
     if is_assignment(statement):
-        names = GIVEN.findall(text)
+        names += GIVEN.findall(text)
     elif word in FORMS:
-        names = _FOUND.findall(text) if FORMS[word].stopped else []
+        names += _FOUND.findall(text) if FORMS[word].stopped else []
     elif word in JOINT_MOVES or word.startswith(b"MOVE"):
-        names = []
+        pass
     elif word in changing:
-        names = _arguments(text.lstrip()[len(word) :], changing[word])
+        names += _arguments(text.lstrip()[len(word) :], changing[word])
     else:
-        names = [*GIVEN.findall(text), *_MENTIONED.findall(text.partition(b" ")[2])]
+        form = _PARTLY_MENTIONED if word in _WRITING or word not in TABLE else _MENTIONED
+        names += [*GIVEN.findall(text), *form.findall(text.lstrip().partition(b" ")[2])]
     return [name.decode("latin-1").upper() for name in names]
 
 

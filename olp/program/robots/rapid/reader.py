@@ -101,7 +101,7 @@ class _Reader:
                 routine = routine.of("")
             if not statement.block and self.declared.declare(statement, routine):
                 continue
-            given = () if statement.block else flow.given_in(statement, changing)
+            given = flow.given_in(statement, changing)
             if given:
                 value = flow.value_in(statement)
                 for name in given:
