@@ -131,6 +131,16 @@ def test_on_an_arm_too(tmp_path: Path) -> None:
     assert lines["p20"] not in written
 
 
+def test_a_position_that_lacks_numbers_is_left(bent: dict[str, Path]) -> None:
+    """What it lacks is as where the robot comes from, and stays corrected."""
+    plain = KRL.replace("  XP3=XP1\n  XP3.Z=XP3.Z+10\n  LIN XP3\n", "")
+    text = plain.replace("  LIN XP2", "  LIN {Z -90}\n  LIN XP2")
+    done = olp.correct(text.encode(), bent["krl"])
+    assert done.data.replace(b"  LIN {Z -90}\n", b"").splitlines()[2:] != plain.encode().splitlines()[2:]
+    assert b"\n  LIN {Z -90}\n" in done.data
+    assert any(found.lines == (5,) and "lacks one of X" in found.message for found in done.findings)
+
+
 def test_a_frame_that_is_a_target_too_stays(bent: dict[str, Path]) -> None:
     text = KRL.replace("  XP3=XP1\n  XP3.Z=XP3.Z+10\n  LIN XP3\n", "  $BASE=XP1\n").replace(
         "X 350,Y 200,Z -100", "X 50,Y 10,Z 5"

@@ -402,6 +402,11 @@ class _Reader:
         numbers, name = stated.numbers, stated.name
         if numbers.span not in self.targets:
             what = "the position" if name is None else f"the position {key_of(name[1], name[2])}"
+            if not (numbers.joints or numbers.whole):
+                # what it lacks is as it is where the robot comes from
+                raise DecidedInRun(
+                    f"{what} lacks one of X, Y, Z, A, B, C; state all of them", line=line.line, code="OLP533"
+                )
             pose = pose_of(numbers, line.line, what)
             x, y, z, a, b, c, _, turn, along, *_ = numbers.spans
             self.targets[numbers.span] = self.moves.target(

@@ -62,6 +62,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"CA": (_NO, "ends an arc by its angle, elsewhere than its end says; program the end"),
     b"$CIRC_TYPE=": (_NO, "before an arc, with another value than #BASE: the tool turns along with the arc"),
     b"SPLINE": (_NO, "is a spline; post straight moves"),
+    b"{X ...} that lacks numbers": (_R, "left as written: they are as where the robot comes from"),
     b"LIN_REL, PTP_REL": (_R, "left as written: a distance from where the robot is"),
     b"ASYPTP": (_NO, "moves external axes past the targets"),
     b"#TCP": (_R, "the tool stands still, and the robot moves the part: moves are left as written"),
