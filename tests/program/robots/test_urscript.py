@@ -132,6 +132,34 @@ def test_a_statement_goes_on_until_its_brackets_are_closed(bent: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_pose_that_is_added_goes_along_with_its_target(bent: Path, zero: Path) -> None:
+    """The place is added along the frame. How one that turns is added is not stated, so it is left."""
+    frame, second = "p[0.3,0.25,-0.3,0,0,0.4]", [0.02, -0.01, 0.03]
+    names = f"  P=p[0.05,0.02,0.01,{TURN}]\n  D=p[0.02,-0.01,0.03,0,0,0]\n"
+    move = "  movej(pose_trans({},{}),a=1,v=1)\n"
+
+    def correct(*targets: str) -> str:
+        text = HEAD + names + "".join(move.format(frame, target) for target in targets) + "end\n"
+        assert olp.correct(text.encode(), zero).data == text.encode()
+        return olp.correct(text.encode(), bent).data.decode()
+
+    def found(form: str, text: str) -> np.ndarray:
+        return np.array([float(value) for value in re.findall(form, text)[0].split(",")[:3]])
+
+    there = found(r"pose_trans\(p\[[^]]*\],p\[(.*)\]\)", correct(f"p[0.07,0.01,0.04,{TURN}]"))
+    for target in ("pose_add(P , p[0.02,-0.01,0.03,0,0,0])", "pose_add(P,D)"):
+        done = correct(target)
+        assert np.abs(found(r" P=p\[(.*)\]", done) + second - there).max() < 2.1e-8
+        assert target in done
+    both = correct("pose_add(P,p[0.02,-0.01,0.03,0,0,0])", "P")
+    away = found(r"pose_add\(P,p\[(.*?)\]\)", both)
+    assert np.abs(found(r" P=p\[(.*)\]", both) + away - there).max() < 2.1e-8
+    assert np.abs(away - second).max() > 1e-8, "the target is that of the other move"
+    left = correct("pose_add(P,p[0.02,-0.01,0.03,0,0,0.1])", f"p[0.07,0.01,0.04,{TURN}]")
+    assert names.encode() in left.encode(), "what a move that is left goes by stays"
+
+
+@pytest.mark.slow
 def test_calls_in_one_line_are_statements_of_their_own(bent: Path) -> None:
     """As the control reads them, which looks for no ends of lines behind calls."""
     frame = "p[0.3,0.25,-0.3,0,0,0]"

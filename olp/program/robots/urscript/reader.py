@@ -17,7 +17,7 @@ from olp.program.dialect import Dialect, Options, Support
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
 from olp.program.robots.moves import NAN, DecidedInRun, RobotMoves, take_all
-from olp.program.robots.poses import Pose, of_vector
+from olp.program.robots.poses import NO_TURN, Pose, of_vector
 from olp.program.robots.targets import NOWHERE, Span, Use
 from olp.program.robots.urscript.calls import Calls
 from olp.program.robots.urscript.named import ASSIGNED, ELEMENT, Names
@@ -48,6 +48,7 @@ _ALONE = (b"movel", b"movep", b"movej", b"movec", b"set_tcp")
 _ORDERS = {b"movep": ("a", "v", "r"), b"movec": ("a", "v", "r", "mode")}
 _NUMBER = pattern(rb"\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
 _TRANSFORMED = pattern(rb"\s*pose_trans\((.*)\)\s*")
+_ADDED = pattern(rb"\s*pose_add\((.*)\)\s*")
 _WORDS = pattern(rb"[A-Za-z_]\w*")
 #: In metres, as lengths of the language are.
 _MM_PER_M = 1000.0
@@ -56,6 +57,11 @@ _MM_PER_M = 1000.0
 def _states(value: bytes) -> bool:
     """Whether a value is a pose or joints with numbers."""
     return POSE.fullmatch(value) is not None or JOINTS.fullmatch(value) is not None
+
+
+def _within(begin: int, text: bytes) -> Span:
+    """The bytes of a text from byte `begin` on, without blanks around it."""
+    return begin + len(text) - len(text.lstrip()), begin + len(text.rstrip())
 
 
 def read(
@@ -221,15 +227,10 @@ class _Reader:
                 feed=feed if straight else NAN, whole=timed,
             )  # fmt: skip
             return
-        index, span, named, frame = self._target(line, begin, target)
+        use, frame = self._use(line, start, begin, target, rest.get("r", NOWHERE))
         if call[1] == b"movej":
-            self._reached_near(line, index, near)
+            self._reached_near(line, use.target, near)
         self._begins_in_loop()
-        turn = self.moves.targets[index].turn
-        use = Use(
-            index, (start, line.begin + len(line.text)), span, named, turn=turn,
-            zone=rest.get("r", NOWHERE),
-        )  # fmt: skip
         self.moves.move(
             line.line, use, frame, self._tool(line), feed, straight=call[1] != b"movej", whole=timed
         )
@@ -272,12 +273,8 @@ class _Reader:
                 line=line.line,
                 code="OLP512",
             )
-        statement, ends = (start, line.begin + len(line.text)), []
-        for begin, text in arguments[:2]:
-            index, span, named, frame = self._target(line, begin, text)
-            turn = self.moves.targets[index].turn
-            ends.append((Use(index, statement, span, named, turn=turn, zone=rest.get("r", NOWHERE)), frame))
-        (via, frame), (end, other) = ends
+        zone = rest.get("r", NOWHERE)
+        (via, frame), (end, other) = (self._use(line, start, *each, zone) for each in arguments[:2])
         if frame.name != other.name:
             what = "via point and end of this arc are in different frames"
             raise DecidedInRun(what, line=line.line, code="OLP512")
@@ -329,8 +326,9 @@ class _Reader:
         """Whether a name stands for joint values with numbers."""
         return text.strip() in self.joints
 
-    def _target(self, line: Line, begin: int, text: bytes) -> tuple[int, Span, Span, Located]:
-        """The place of a target, its bytes, those of its name, and the frame that it is in."""
+    def _use(self, line: Line, start: int, begin: int, text: bytes, zone: Span) -> tuple[Use, Located]:
+        """How a move, which begins at byte `start`, uses the target that is the text from byte `begin` on.
+        Also the frame that this is in."""
         frame, stated = self.moves.frames.world, _TRANSFORMED.fullmatch(text)
         if stated is not None:
             parts = list(_ARGUMENT.finditer(stated[1]))
@@ -339,9 +337,27 @@ class _Reader:
                 raise self._computed(line, text)
             frame = located
             begin, text = begin + stated.start(1) + parts[1].start(), parts[1][0]
-        blank = len(text) - len(text.lstrip())
-        span = (begin + blank, begin + len(text.rstrip()))
-        named = self.names.get(text)
+        place, added, offsets = _within(begin, text), Pose(), ()
+        sum_ = _ADDED.fullmatch(text)
+        if sum_ is not None:
+            parts = list(_ARGUMENT.finditer(sum_[1]))
+            behind = None if len(parts) != 2 else self._pose(parts[1][0])
+            if behind is None or behind.turn != NO_TURN:
+                raise self._computed(line, text)
+            first = begin + sum_.start(1)
+            numbers = POSE.fullmatch(self.data, *_within(first + parts[1].start(), parts[1][0]))
+            added, offsets = behind, () if numbers is None else tuple(map(numbers.span, (1, 2, 3)))
+            begin, text = first + parts[0].start(), parts[0][0]
+        index, named = self._target(line, begin, text)
+        use = Use(
+            index, (start, line.begin + len(line.text)), place, named, added.origin_mm,
+            self.moves.targets[index].turn, zone=zone, offsets=offsets,
+        )  # fmt: skip
+        return use, frame
+
+    def _target(self, line: Line, begin: int, text: bytes) -> tuple[int, Span]:
+        """The place of a target, and the bytes of its name."""
+        span, named = _within(begin, text), self.names.get(text)
         match = POSE.fullmatch(self.data, *(span if named is None else named.value))
         if match is None:
             raise self._computed(line, text)
@@ -357,7 +373,7 @@ class _Reader:
                 of_vector(numbers[3:]), (), name, NOWHERE if named is None else named.statement,
                 (match.span(4), match.span(5), match.span(6)),
             )  # fmt: skip
-        return self.targets[key], span, NOWHERE if named is None else span, frame
+        return self.targets[key], NOWHERE if named is None else span
 
     def _frame(self, line: Line, text: bytes) -> Located | None:
         """The frame that a pose, or the name of one, is; None where there is none with numbers."""

@@ -29,6 +29,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"get_inverse_kin": (_C, "in a movej: its pose, reached near the joints that it states"),
     b"p[...]": (_C, "changed where moves use it, and cloned where they differ"),
     b"pose_trans": (_R, "of a frame with numbers and a target: the target is corrected"),
+    b"pose_add": (_R, "in a move, of a target and a pose that does not turn: the target is corrected"),
     b"set_tcp": (_R, "the tool from here on; moves whose tool depends on the run are left as written"),
     b"def, thread": (_R, "where its first move comes from is not known: it is corrected at its end"),
     b"if, while, for": (_R, "behind moves that may not run, the next one is corrected at its end"),
