@@ -128,6 +128,27 @@ def test_frames_and_tools_of_registers(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("before", "behind"),
+    [
+        ((), ("  UFRAME[R[9]]=PR[1]",)),
+        ((), ("  $MNUFRAME[1,1]=PR[1]",)),
+        (("  IF R[1]=1,JMP LBL[1]",), ("  LBL[1]",)),
+        (("  IF (R[1]=1) THEN",), ("  ENDIF",)),
+        ((), ("  UFRAME[1]=PR[2]",)),
+    ],
+)
+def test_a_frame_that_the_run_may_set_otherwise_is_refused(
+    zero: Path, before: tuple[str, ...], behind: tuple[str, ...]
+) -> None:
+    stated = [*(f"  PR[1,{k}]={k}" for k in range(1, 7)), *before, "  UFRAME[1]=PR[1]", *behind]
+    move = "J P[1] 50% FINE"
+    point = position(1, [200, 200, -100]).replace("UF : 3", "UF : 1")
+    for lines in ([*stated, move], ["  LBL[7]", move, *stated, "  JMP LBL[7]"]):
+        with pytest.raises(OlpError, match=r"UFRAME\[1\] gets numbers that the text does not state; state"):
+            olp.correct(text_of(lines, [point]), zero)
+
+
+@pytest.mark.parametrize(
     ("line", "why"),
     [
         ("L P[9] 200mm/sec FINE", "not stated"),

@@ -61,7 +61,7 @@ class _Reader:
     def __init__(self, data: bytes, setup: Setup) -> None:
         self.data, self.setup = data, setup
         self.moves = RobotMoves(data, setup, "UFRAME0")
-        self.registers = Registers()
+        self.registers = Registers(())
         self.manners = Manners(arm=self.moves.arm)
         self.positions: dict[int, list[Position]] = {}
         self.known: dict[int, int] = {}
@@ -86,6 +86,7 @@ class _Reader:
         for line in every:
             copied = _COPIED.match(line.text)
             self.copied += [] if copied is None else [f"P[{int(n)}]" for n in _NUMBERED.findall(copied[1])]
+        self.registers = Registers(line.text for line in every)
         take_all(every, self._statement, self.moves, self.refusals, options)
         return self.moves.program(dialect, words=words)
 
@@ -318,7 +319,7 @@ class _Reader:
 
     def _frame(self, position: Position, line: Line) -> Located:
         number = self.registers.frame if position.frame < 0 else position.frame
-        key = number, self.registers.frames.get(number)
+        key = number, self.registers.frame_of(number)[1]
         if key not in self.frames:
             self.frames[key] = self._located(number, line)
         return self.frames[key]
@@ -328,14 +329,21 @@ class _Reader:
             raise not_read("the frame of this position is the active one, and not known here", line.line)
         if number == 0:
             return self.moves.frames.world
-        pose = self.registers.frames.get(number)
-        if pose is None and number in self.registers.frames:
-            raise not_read(f"UFRAME[{number}] gets numbers that the text does not state", line.line)
+        given, pose = self.registers.frame_of(number)
+        if given and pose is None:
+            raise self._unstated("UFRAME", number, line)
         return self.moves.frames.located(f"UFRAME{number}", pose, line.line)
+
+    @staticmethod
+    def _unstated(table: str, number: int, line: Line) -> ProgramError:
+        what = (
+            f"{table}[{number}] gets numbers that the text does not state; state them in PR[i], and set it "
+        )
+        return not_read(what + "once, before all labels and jumps", line.line)
 
     def _tool(self, position: Position, line: Line) -> Tool:
         number = self.registers.tool if position.tool < 0 else position.tool
-        key = number, self.registers.tools.get(number)
+        key = number, self.registers.tool_of(number)[1]
         if key not in self.tools:
             self.tools[key] = self._numbered(number, line)
         return self.tools[key]
@@ -343,9 +351,9 @@ class _Reader:
     def _numbered(self, number: int, line: Line) -> Tool:
         if number < 0:
             raise not_read("the tool of this position is the active one, and not known here", line.line)
-        pose = self.registers.tools.get(number)
-        if pose is None and number in self.registers.tools:
-            raise not_read(f"UTOOL[{number}] gets numbers that the text does not state", line.line)
+        given, pose = self.registers.tool_of(number)
+        if given and pose is None and number:
+            raise self._unstated("UTOOL", number, line)
         return self.moves.frames.numbered_tool(f"UTOOL{number}", number, pose, line.line)
 
 
