@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, read_only
 from olp.core.values import dataclass
 
 Column = Array | float
@@ -114,37 +114,53 @@ class Interpolant:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DenseTable:
-    """Piecewise linear columns on fine nodes. `cells` holds per column the value (real part) and the rise
-    over the cell (imaginary part), so one gather serves both; a constant column is a plain float.
+    """Piecewise linear columns on fine nodes. `constant` has the number of each column that is the same
+    everywhere, and None of those that vary: (v, count) `value` are theirs at the nodes, and `rise` is how
+    much they rise over the cells.
 
-    `nodes` is None for a uniform grid from `low` with `step`. Else it holds the nodes, the imaginary part is
-    the slope, and `step` is the widest cell. Then `guide` gives the cell at the start of each of many equal
-    bins, none of which holds two nodes (None: bisect).
+    `nodes` is None for a uniform grid from `low` with `step`. Else it holds the nodes, `rise` is the slope,
+    and `step` is the widest cell. Then `guide` gives the cell at the start of each of many equal bins, none
+    of which holds two nodes (None: bisect).
     """
 
     low: float
     step: float
     count: int
     nodes: Array | None
-    cells: tuple[npt.NDArray[np.complex128] | float, ...]
+    constant: tuple[float | None, ...]
+    value: Array
+    rise: Array
     guide: npt.NDArray[np.intp] | None = None
+
+    @classmethod
+    def empty(cls) -> DenseTable:
+        """A table without columns."""
+        none = np.zeros((0, 1))
+        return cls(0.0, 1.0, 1, None, (), none, none)
+
+    @classmethod
+    def of(
+        cls, low: float, step: float, nodes: Array | None, values: Array, guide: npt.NDArray[np.intp] | None
+    ) -> DenseTable:
+        """The table of columns `values` (count, m) at the nodes."""
+        same = np.all(values == values[0], axis=0).tolist()
+        constant = tuple(float(first) if one else None for first, one in zip(values[0], same, strict=True))
+        value = np.ascontiguousarray(values.T[[not one for one in same]])
+        rise = np.zeros_like(value)
+        rise[:, :-1] = np.diff(value) if nodes is None else np.diff(value) / np.diff(nodes)
+        return cls(low, step, len(values), nodes, constant, read_only(value), read_only(rise), guide)
 
     def lookup(self, q: Array) -> list[Column]:
         """One (k,) array, or a float where constant, per column at finite q (k,); end values outside."""
-        if not any(isinstance(cell, np.ndarray) for cell in self.cells):
-            return [cell for cell in self.cells if isinstance(cell, float)]
+        if not len(self.value):
+            return [one for one in self.constant if one is not None]
         index, rest = self._locate(q)
-        columns: list[Column] = []
-        gathered = np.zeros(len(q), dtype=np.complex128)
-        for cell in self.cells:
-            if isinstance(cell, float):
-                columns.append(cell)
-                continue
-            np.take(cell, index, out=gathered, mode="clip")
-            value = gathered.imag * rest
-            value += gathered.real
-            columns.append(value)
-        return columns
+        # all columns in one call
+        columns = self.rise.take(index, axis=1)
+        columns *= rest
+        columns += self.value.take(index, axis=1)
+        varying = iter(columns)
+        return [next(varying) if one is None else one for one in self.constant]
 
     def _locate(self, q: Array) -> tuple[npt.NDArray[np.intp], Array]:
         if self.nodes is not None:
@@ -192,15 +208,13 @@ def dense_table(
         split = max(1, min(math.ceil(base / fine), MAX_CELLS // cells))
         step, count = base / split, cells * split + 1
         positions = low + step * np.arange(count, dtype=np.float64)
-        return DenseTable(low, step, count, None, _cells(evaluate(positions), None))
+        return DenseTable.of(low, step, None, evaluate(positions), None)
     widths = np.diff(knots)
     fine = max(fine, span / max(1, MAX_CELLS - len(widths)))
     pieces = np.maximum(1, np.ceil(widths / fine)).astype(np.intp)
     parts = [a + (b - a) * np.arange(k) / k for a, b, k in zip(knots[:-1], knots[1:], pieces, strict=True)]
     nodes = np.concatenate([*parts, knots[-1:]])
-    widths = np.diff(nodes)
-    cells_of_nodes = _cells(evaluate(nodes), widths)
-    return DenseTable(low, float(widths.max()), len(nodes), nodes, cells_of_nodes, _guide(nodes))
+    return DenseTable.of(low, float(np.diff(nodes).max()), nodes, evaluate(nodes), _guide(nodes))
 
 
 def _guide(nodes: Array) -> npt.NDArray[np.intp] | None:
@@ -226,16 +240,3 @@ def _common_step(knots: Array) -> float | None:
         if float(np.abs(steps - np.round(steps)).max()) * step < ON_GRID_MM:
             return step
     return None
-
-
-def _cells(values: Array, widths: Array | None) -> tuple[npt.NDArray[np.complex128] | float, ...]:
-    cells: list[npt.NDArray[np.complex128] | float] = []
-    for column in values.T:
-        if bool(np.all(column == column[0])):
-            cells.append(float(column[0]))
-            continue
-        cell = column.astype(np.complex128)
-        cell.imag[:-1] = np.diff(column) if widths is None else np.diff(column) / widths
-        cell.flags.writeable = False
-        cells.append(cell)
-    return tuple(cells)

@@ -168,7 +168,7 @@ class RigidBody(Boxed):
                 else:
                     lever_arms = [(rows, lever_arm.at(position, tool)) for rows, lever_arm in body.lever_arms]
                     turned = _first_order((None, None, None, *six[3:]), lever_arms)
-            error = [_sum(_sum(error[i], six[i]), _sum(shift[i], turned[i])) for i in range(3)]
+            error = [_added(_added(error[i], six[i]), _added(shift[i], turned[i])) for i in range(3)]
         return error
 
     def _turn(self, body: Body, six: Six, position: list[Array], tool: list[Column], carried: Three) -> Three:
@@ -179,7 +179,10 @@ class RigidBody(Boxed):
         turned: Three = [None, None, None]
         for rows, lever_arm in body.lever_arms:
             arm = lever_arm.at(position, tool)
-            moved = _rotate(angles, [_plus(arm[k], carried[k]) for k in range(3)])
+            for k, more in enumerate(carried):
+                if more is not None:
+                    arm[k] += more
+            moved = _rotate(angles, arm)
             for i in rows:
                 turned[i] = moved[i]
         return turned
@@ -233,25 +236,34 @@ def _sine(angle: Column, terms: int) -> tuple[Column, Column]:
     if terms == 0:
         return np.sin(angle), np.tan(0.5 * angle)
     if terms == 2:
-        angle = angle - angle * angle * angle * (1.0 / 6.0)
+        third = angle * angle
+        third *= angle
+        third *= 1.0 / 6.0
+        angle = angle - third
     return angle, 0.5 * angle
 
 
 def _rotate(angles: list[tuple[int, Column, Column]], arm: list[Column]) -> Three:
-    """(S - I) arm for the turns (axis, sin, tan of half) in their order, as exact plane rotations."""
+    """(S - I) arm for the turns (axis, sin, tan of half) in their order, as exact plane rotations. The
+    columns of `arm` are changed."""
     moved: Three = [None, None, None]
-    for turn, (a, sine, half) in enumerate(angles):
+    for turn, (a, sine, half) in enumerate(angles, 1):
         p, q = _PLANES[a]
         back = half * arm[p]
         back += arm[q]
         back *= sine
-        ahead = arm[p] - half * arm[q]
-        ahead *= sine
-        done = moved[p]
-        moved[p], moved[q] = -back if done is None else done - back, _sum(moved[q], ahead)
-        if turn + 1 < len(angles):
-            arm = list(arm)
-            arm[p], arm[q] = arm[p] - back, arm[q] + ahead
+        aside = half * arm[q]
+        aside -= arm[p]
+        aside *= sine
+        for i, less in ((p, back), (q, aside)):
+            if turn < len(angles):
+                arm[i] -= less
+            done = moved[i]
+            if done is None:
+                moved[i] = -less
+            else:
+                done -= less
+                moved[i] = done
     return moved
 
 
@@ -261,8 +273,12 @@ def _sum(a: Column | None, b: Column | None) -> Column | None:
     return a if b is None else a + b
 
 
-def _plus(a: Column, b: Column | None) -> Column:
-    return a if b is None else a + b
+def _added(a: Column | None, b: Column | None) -> Column | None:
+    """The sum of columns that are needed no more."""
+    if a is None or b is None:
+        return b if a is None else a
+    a += b
+    return a
 
 
 def _columns(three: Three, n: int) -> Array:

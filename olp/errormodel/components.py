@@ -186,7 +186,7 @@ class AxisColumns:
 
     def table(self) -> DenseTable:
         if not self.interpolants:
-            return DenseTable(0.0, 1.0, 1, None, ())
+            return DenseTable.empty()
         curvature = np.concatenate([f.max_curvature() for f in self.interpolants])
         tolerance = [TABLE_RAD if name[1] in "ABC" else TABLE_MM for _, name in self._keys]
 
