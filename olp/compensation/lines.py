@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from olp.compensation.invert import bent
-from olp.core.arrays import Array, Index, Mask, all_in_row
+from olp.core.arrays import Array, Index, Mask, all_in_row, distinct
 from olp.core.toolpath import Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
@@ -26,10 +26,12 @@ _FINE = 4
 _CLOSE = 32
 #: samples at a time, so that memory is small
 _BATCH = 1 << 18
-#: samples of a chord that the search tests, at most
+#: samples of a chord that the search tests, and that are tested together
 _FEW = 16
-#: all samples of a chord
-_ALL = 1 << 30
+#: (_FEW, 1) the middles of equal parts of a chord, in parts
+_MIDDLES = (np.arange(_FEW) + 0.5)[:, None]
+#: chords that are tested together, so that their samples fit in the second-level cache
+_CHORDS = 1024
 
 
 def no_cuts() -> Cuts:
@@ -66,18 +68,13 @@ def subdivide_lines(
 def _cut(model: ErrorModel, move: Index, start: Array, delta: Array, tool: Array, tolerance: float) -> Cuts:
     count = steps_needed(model, delta, tool, _SAMPLE_SHARE * tolerance, at_least=8)
     parts: list[Cuts] = []
-    begin = 0
-    totals = np.cumsum(count + 1)
-    while begin < len(move):
-        stop = max(int(np.searchsorted(totals, (totals[begin - 1] if begin else 0) + _BATCH)), begin + 1)
-        pick = slice(begin, stop)
-        parts.append(
-            _cut_batch(
-                model, move[pick], start[pick], delta[pick], tool if tool.ndim == 1 else tool[pick],
-                count[pick], tolerance,
-            )
-        )  # fmt: skip
-        begin = stop
+    for steps in distinct(count).tolist():
+        alike = np.flatnonzero(count == steps)
+        size = max(_BATCH // (steps + 1), 1)
+        for a in range(0, len(alike), size):
+            some = alike[a : a + size]
+            own = tool if tool.ndim == 1 else tool[some]
+            parts.append(_cut_alike(model, move[some], start[some], delta[some], own, steps, tolerance))
     return (
         np.concatenate([p[0] for p in parts]),
         np.concatenate([p[1] for p in parts]),
@@ -85,56 +82,63 @@ def _cut(model: ErrorModel, move: Index, start: Array, delta: Array, tool: Array
     )
 
 
-def _cut_batch(
-    model: ErrorModel, move: Index, start: Array, delta: Array, tool: Array, count: Index, tolerance: float
+def _cut_alike(
+    model: ErrorModel, move: Index, start: Array, delta: Array, tool: Array, steps: int, tolerance: float
 ) -> Cuts:
-    samples = count + 1
-    first = np.cumsum(samples) - samples
-    owner = np.repeat(np.arange(len(move)), samples)
-    share = (np.arange(len(owner)) - np.repeat(first, samples)) / np.repeat(count, samples)
-    # a number repeated takes a third of the time of one looked up
-    point = np.empty((len(owner), 3))
-    for axis in range(3):
-        column = np.repeat(delta[:, axis], samples)
-        column *= share
-        column += np.repeat(start[:, axis], samples)
-        point[:, axis] = column
-    tools = tool if tool.ndim == 1 else tool[owner]
-    play = None
-    if model.backlash_at(point[:1]) is not None:
-        play = np.sign(delta).take(owner, axis=0)
-    departure = point - bent(model, point, tools, play)
-    across = np.zeros((2, len(owner)))
-    sides = _sides(delta)
-    for axis in range(3):
-        away = departure[:, axis].copy()
-        for column, side in zip(across, sides, strict=True):
-            column += away * np.repeat(side[:, axis], samples)
-    last = count * _FINE
+    """The cuts of moves that are sampled at as many equal steps."""
+    across = _across(model, start, delta, tool, steps)
+    first = np.arange(len(move)) * (steps + 1)
+    last = steps * _FINE
     cut_move, cut_place = [], []
     begin = np.zeros(len(move), np.int64)
     active = np.arange(len(move))
-    stride = last.copy()
+    stride = np.full(len(move), last)
     while active.size:
-        reach = _longest(across, first[active], begin[active], last[active], stride[active], tolerance, _FEW)
+        reach = _longest(across, first[active], begin[active], last, stride[active], tolerance)
         # the search tests few samples of a long chord; its result is tested at all of them
         long = np.flatnonzero(reach - begin[active] > _FINE * _FEW)
         some = active[long]
         at_begin = _between(across, first[some], begin[some])
-        wrong = long[~_fits(across, first[some], begin[some], at_begin, reach[long], tolerance, _ALL)]
+        wrong = long[~_fits(across, first[some], begin[some], at_begin, reach[long], tolerance, every=True)]
         if wrong.size:
             again = active[wrong]
             reach[wrong] = _longest(
-                across, first[again], begin[again], last[again], stride[again], tolerance, _ALL
+                across, first[again], begin[again], last, stride[again], tolerance, every=True
             )
         stride[active] = np.maximum(reach - begin[active], 1)
         begin[active] = reach
-        active = active[reach < last[active]]
+        active = active[reach < last]
         cut_move.append(active)
         cut_place.append(begin[active])
     owner = np.concatenate(cut_move)
-    share = np.concatenate(cut_place) / last[owner]
+    share = np.concatenate(cut_place) / last
     return move[owner], share, start[owner] + share[:, None] * delta[owner]
+
+
+def _across(model: ErrorModel, start: Array, delta: Array, tool: Array, steps: int) -> Array:
+    """(2, n (steps + 1)) how far the commands bend from lines (n, 3), in two directions across each, at the
+    samples of one line after the other."""
+    samples = steps + 1
+    share = np.arange(samples) / steps
+    shape = len(delta), samples
+    point = np.empty((*shape, 3))
+    for axis in range(3):
+        column = delta[:, axis, None] * share
+        column += start[:, axis, None]
+        point[..., axis] = column
+    point = point.reshape(-1, 3)
+    tools = tool if tool.ndim == 1 else np.repeat(tool, samples, axis=0)
+    play = None
+    if model.backlash_at(point[:1]) is not None:
+        play = np.repeat(np.sign(delta), samples, axis=0)
+    departure = point - bent(model, point, tools, play)
+    across = np.zeros((2, *shape))
+    sides = _sides(delta)
+    for axis in range(3):
+        away = departure[:, axis].copy().reshape(shape)
+        for column, side in zip(across, sides, strict=True):
+            column += away * side[:, axis, None]
+    return across.reshape(2, -1)
 
 
 def _sides(delta: Array) -> tuple[Array, Array]:
@@ -148,25 +152,26 @@ def _sides(delta: Array) -> tuple[Array, Array]:
 
 
 def _longest(
-    across: Array, first: Index, begin: Index, last: Index, stride: Index, tolerance: float, most: int
-) -> Index:
+    across: Array, first: Index, begin: Index, last: int, stride: Index, tolerance: float,
+    *, every: bool = False,
+) -> Index:  # fmt: skip
     """For each move the farthest position that one chord from `begin` reaches: gallop, then bisect, to 3 % of
     the chord."""
     good = begin + 1
-    bad = last + 1
+    bad = np.full(len(first), last + 1)
     at_begin = _between(across, first, begin)
     trial = np.minimum(begin + np.maximum(stride, 1), last)
     todo = np.arange(len(first))
     galloping = np.ones(len(first), bool)
     while todo.size:
-        fits = _fits(across, first[todo], begin[todo], at_begin[:, todo], trial[todo], tolerance, most)
+        fits = _fits(across, first[todo], begin[todo], at_begin[:, todo], trial[todo], tolerance, every=every)
         yes, no = todo[fits], todo[~fits]
         good[yes] = trial[yes]
         bad[no] = trial[no]
         galloping[no] = False
         known, length = good[todo], good[todo] - begin[todo]
-        todo = todo[(bad[todo] - known > 1 + length // _CLOSE) & (known < last[todo])]
-        known, ahead = good[todo], np.minimum(bad[todo] - 1, last[todo])
+        todo = todo[(bad[todo] - known > 1 + length // _CLOSE) & (known < last)]
+        known, ahead = good[todo], np.minimum(bad[todo] - 1, last)
         jump = known + (known - begin[todo])
         middle = np.maximum((known + ahead + 1) // 2, known + 1)
         trial[todo] = np.minimum(np.where(galloping[todo], jump, middle), ahead)
@@ -174,10 +179,10 @@ def _longest(
 
 
 def _fits(
-    across: Array, first: Index, begin: Index, at_begin: Array, end: Index, tolerance: float, most: int
+    across: Array, first: Index, begin: Index, at_begin: Array, end: Index, tolerance: float, *, every: bool
 ) -> Mask:
-    """Whether the samples between the positions `begin` and `end`, at most `most` of them, are within
-    tolerance of their chord. `at_begin` (2, n) are the values where it begins."""
+    """Whether samples between the positions `begin` and `end` are within tolerance of their chord: `every`
+    one, or _FEW of them. `at_begin` (2, n) are the values where it begins."""
     fits = np.ones(len(begin), bool)
     low = begin // _FINE + 1
     inner = (end - 1) // _FINE + 1 - low
@@ -187,31 +192,45 @@ def _fits(
     if wide.size < len(begin):
         first, begin, end, low, inner = (column.take(wide) for column in (first, begin, end, low, inner))
         at_begin = at_begin.take(wide, axis=1)
-    looked = np.minimum(inner, most)
-    ends = np.cumsum(looked)
-    total, offset = int(ends[-1]), ends - looked
-    # the nth sample behind the first one: all of them, or from each of equal parts the one in its middle
-    nth = np.arange(0.5, total)
-    nth -= np.repeat(offset.astype(float), looked)
-    if total < int(inner.sum()):
-        nth *= np.repeat(inner / looked, looked)
-    np.floor(nth, out=nth)
-    sample = nth.astype(np.int64)
-    sample += np.repeat(first + low, looked)
     # the chord at the first sample, and from each sample to the next
     per_sample = _FINE / (end - begin)
     ahead = (_FINE * low - begin) / (end - begin)
-    square = np.zeros(total)
     rise = _between(across, first, end) - at_begin
-    for values, rises, begins in zip(across, per_sample * rise, at_begin + ahead * rise, strict=True):
-        departure = np.repeat(rises, looked)
-        departure *= nth
-        departure += np.repeat(begins, looked)
-        departure -= values.take(sample)
+    chord = np.vstack((at_begin + ahead * rise, per_sample * rise))
+    sample, last, before, step = first + low, inner - 1.0, np.zeros(len(inner)), np.maximum(inner / _FEW, 1.0)
+    if every:
+        # those of a long chord in parts
+        parts = -(-inner // _FEW)
+        head = np.cumsum(parts) - parts
+        of = np.repeat(np.arange(len(inner)), parts)
+        sample, last, before = sample[of], last[of], _FEW * (np.arange(len(of)) - head[of])
+        chord, step = chord.take(of, axis=1), np.ones(len(of))
+    square = np.empty(len(sample))
+    for a in range(0, len(sample), _CHORDS):
+        some = slice(a, a + _CHORDS)
+        # from each of equal parts the one in its middle; one that is looked at twice changes nothing
+        nth = _MIDDLES * step[some]
+        nth += before[some]
+        np.floor(nth, out=nth)
+        np.minimum(nth, last[some], out=nth)
+        square[some] = _largest_square(across, sample[some], chord[:, some], nth)
+    fits[wide] = (np.maximum.reduceat(square, head) if every else square) <= tolerance * tolerance
+    return fits
+
+
+def _largest_square(across: Array, sample: Index, chord: Array, nth: Array) -> Array:
+    """(n,) the largest square of a distance from each chord among samples `nth` (k, n) behind `sample` (n,).
+    `chord` (4, n): both values of the chord at that one, and how much they rise to the next."""
+    number = nth.astype(np.int64)
+    number += sample
+    square = np.zeros(nth.shape)
+    for values, begin, rise in zip(across, chord[:2], chord[2:], strict=True):
+        departure = rise * nth
+        departure += begin
+        departure -= values.take(number)
         departure *= departure
         square += departure
-    fits[wide] = np.maximum.reduceat(square, offset) <= tolerance * tolerance
-    return fits
+    return np.asarray(square.max(axis=0))
 
 
 def _between(across: Array, first: Index, place: Index) -> Array:
