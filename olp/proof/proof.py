@@ -203,9 +203,12 @@ def prove(
     feed = marked(len(path), lambda some: np.asarray(counts[some] == Counts.FEED))
 
     def side(program: Program, ends: Index, told: Progress) -> _Measured:
-        deviation = measure(path, target, program.toolpath, ends, feed, model, bend, told)
-        strokes = strokes_mm(nominal, target, program.toolpath, program.holes, model, bend)
-        size = _sizes(deviation, how, *strokes)
+        bottom, stroke = strokes_mm(nominal, target, program.toolpath, program.holes, model, bend)
+        by_hole = len(bottom) > 0
+        deviation = measure(
+            path, target, program.toolpath, ends, feed, model, bend, told, strokes=not by_hole
+        )
+        size = _sizes(deviation, how, bottom, stroke)
         for some in spans(len(size)):
             size[some][counts[some] > Counts.LEFT] = np.nan
         return _Measured(deviation.waypoint, deviation.side, deviation.bend_mm, size)

@@ -94,6 +94,22 @@ def test_the_end_the_path_and_the_bend_of_a_line() -> None:
     assert {part.dtype for part in (got.waypoint, got.path)} == {np.dtype(np.float32)}
 
 
+def test_strokes_of_cycles_that_are_compared_apart_have_no_samples_here() -> None:
+    """A split stroke, and a feed move of the same program behind it, half a wave each."""
+    path = toolpath(rapid(0, 0, 0), line(0, 0, -50, flag=CYCLE), rapid(0, 0, 0, flag=CYCLE), line(0, 0, -50))
+    # the flag of the nominal move counts
+    moves = rapid(0, 0, 0), line(0, 0, -9), line(0, 0, -50), rapid(0, 0, 0), line(0, 0, -50)
+    groups, counted = np.array([0, 2, 3, 4]), np.ones(4, bool)
+    model, other = wave(1, 2, 0.01, 100.0), toolpath(*moves)
+    with_them, without = (
+        measure(path, path.end_mm, other, groups, counted, model, BEND_MM, strokes=own)
+        for own in (True, False)
+    )
+    assert with_them.path == pytest.approx([0.0, 0.01, 0.0, 0.01], abs=1e-4)
+    # of the stroke only the ends of its parts count
+    assert without.path == pytest.approx([0.0, 0.01 * math.sin(0.09 * math.pi * 2), 0.0, 0.01], abs=1e-4)
+
+
 def test_the_first_move_bends_as_any_other() -> None:
     got = of(toolpath(line(50, 0, 0)), wave(1, 0, 0.01, 100.0))
     assert got.bend_mm == pytest.approx(0.01, abs=1e-4)

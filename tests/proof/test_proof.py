@@ -23,6 +23,7 @@ from cases.paths import (
     program,
     rapid,
     toolpath,
+    wave,
 )
 
 from olp.core.arrays import Array
@@ -186,6 +187,13 @@ def test_a_hole_counts_at_the_move_to_its_bottom() -> None:
     assert 1e3 * alone.before_mm[[2, 4]] == pytest.approx([2.0, 2.0], rel=1e-3)
 
 
+def test_a_stroke_counts_between_its_ends_too() -> None:
+    """A whole wave of 10 um that is zero at both ends, with a partner and without."""
+    for holes in ((hole(1, 4, r=5.0, z=-5.0),), ()):
+        got = proved(of(*pecked(-5.0), holes=holes), model=wave(1, 2, 0.01, 10.0))
+        assert got.after_mm[2] == pytest.approx(0.01, abs=1e-4)
+
+
 def test_cuts_that_start_where_a_move_was_left_uncorrected_lean() -> None:
     moves = (
         rapid(0, 0, 0), line(9, 0, 0), line(9, 9, 0, flag=PASS), line(0, 9, 0), line(0, 0, 0),
@@ -265,9 +273,9 @@ def test_numbers_of_the_proof(monkeypatch: pytest.MonkeyPatch) -> None:
         given["near"] = values[4]
         return match(*values)
 
-    def measured(*values: Any) -> Deviation:
+    def measured(*values: Any, **words: Any) -> Deviation:
         given["bend"] = values[6]
-        return measure(*values)
+        return measure(*values, **words)
 
     monkeypatch.setattr(module, "match", matched)
     monkeypatch.setattr(module, "measure", measured)
