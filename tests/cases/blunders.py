@@ -243,44 +243,38 @@ def size_of(taken: Measurements, clean: Fit, blunder: Blunder) -> Size:
 
 def size(clean: Fit, index: int, taken: Observation, planted: Observation) -> Size:
     """By how many standard deviations a blunder moves what a source says of the unknowns, against what all
-    other readings and the prior predict."""
+    other readings and the prior predict of what is stated to have been read."""
     # with all its readings, also those that the fit left out
     state = _started(taken, clean.results[index].state)
-    against = _against(clean, index)
-    shifted = Normal.of(clean.parameters.size)
-    shifted.add(_shift(clean, state, clean.block(state), planted))
-    away = against.turn @ shifted.g[against.columns]
-    some = against.share > 1e-3
-    alone = away[some] ** 2 / against.share[some]
-    both = float(np.sum(alone / (1.0 + against.share[some])))
+    stated = clean.block(_started(planted, state))
+    own, shifted = (Normal.of(clean.parameters.size) for _ in range(2))
+    own.add(stated)
+    shifted.add(_shift(clean, clean.block(state), stated))
+    away, share = _against(_given(clean, index), own.H, shifted.g)
+    some = share > 1e-3
+    alone = away[some] ** 2 / share[some]
+    both = float(np.sum(alone / (1.0 + share[some])))
     return Size(float(np.sqrt(both)), both / max(float(np.sum(alone)), 1e-300))
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Against:
-    """A source against all others, in directions of its unknowns `columns` (k,): what others say has a
-    standard deviation of 1 in each, and the source `share` (r,) of their precision. `turn` (r, k) is to
-    them."""
-
-    columns: np.ndarray
-    turn: np.ndarray
-    share: np.ndarray
+def _against(covariance: np.ndarray, own: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A source against the covariance of what all others say: what is on its right side, and the share of its
+    precision `own`, in the directions in which the others have a standard deviation of 1."""
+    columns = np.flatnonzero(own.any(axis=0))
+    variance, vectors = np.linalg.eigh(covariance[np.ix_(columns, columns)])
+    root = vectors * np.sqrt(np.maximum(variance, 0.0))
+    share, directions = np.linalg.eigh(root.T @ own[np.ix_(columns, columns)] @ root)
+    return directions.T @ (root.T @ right[columns]), share
 
 
 @lru_cache(maxsize=64)
-def _against(clean: Fit, index: int) -> _Against:
+def _given(clean: Fit, index: int) -> np.ndarray:
+    """The covariance of the unknowns by the prior and all sources but one."""
     of = _precisions(clean)
-    size = clean.parameters.size
     total = clean.prior.precision()[0] + sum(one for k, one in enumerate(of) if k != index)
-    own = of[index]
-    columns = np.flatnonzero(own.any(axis=0))
     scale = np.sqrt(np.diag(total))
-    covariance = np.linalg.inv(total / np.outer(scale, scale) + 1e-13 * np.eye(size))
-    covariance = (covariance / np.outer(scale, scale))[np.ix_(columns, columns)]
-    variance, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(variance, 0.0))
-    share, directions = np.linalg.eigh(root.T @ own[np.ix_(columns, columns)] @ root)
-    return _Against(columns, directions.T @ root.T, share)
+    covariance = np.linalg.inv(total / np.outer(scale, scale) + 1e-13 * np.eye(len(scale)))
+    return np.asarray(covariance / np.outer(scale, scale))
 
 
 @lru_cache(maxsize=2)
@@ -300,20 +294,19 @@ def _started(observation: Observation, like: State) -> State:
     return state if noise is None else dataclasses.replace(state, noise=noise)  # type: ignore[type-var]
 
 
-def _shift(clean: Fit, state: State, block: Block, planted: Observation) -> Block:
-    """The rows of a source with the change of its residuals by the blunder as readings."""
-    other = _started(planted, state)
+def _shift(clean: Fit, right: Block, stated: Block) -> Block:
+    """The rows of a source as it is stated with a blunder, and the change of its residuals by that as
+    readings."""
     theta = clean.theta
-    wrong = clean.block(other)
 
     def residuals(of: Block) -> list[np.ndarray]:
         return [chunk.y - chunk.rows @ theta[of.columns] for chunk in of.chunks()]
 
     def chunks() -> Iterator[Chunk]:
-        for chunk, before, after in zip(block.chunks(), residuals(block), residuals(wrong), strict=True):
+        for chunk, before, after in zip(stated.chunks(), residuals(right), residuals(stated), strict=True):
             yield Chunk(chunk.rows, after - before, chunk.sigma, chunk.local)
 
-    return Block(block.columns, block.precision, chunks)
+    return Block(stated.columns, stated.precision, chunks)
 
 
 @lru_cache(maxsize=4)

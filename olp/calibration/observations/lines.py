@@ -50,6 +50,8 @@ LEAST = 1e-5, 1e-8
 ARCSEC_URAD = math.pi / 0.648
 #: Standard deviation of a place or lever arm that may be another one, mm.
 OWN_LEVER_MM = 500.0
+#: By how much axes at rest tilt a line at another place, as a standard deviation, rad.
+_OWN_TILT = 5e-5
 _DOUBLE = (
     ("factor 2", 2.0, "its values are half of what they should be"),
     ("factor 2", 0.5, "its values are twice what they should be"),
@@ -394,6 +396,10 @@ def line_block(line: Line, parameters: Parameters, noise: Noise, theta: Array | 
             each = [values @ theta[part] for part, values in parameters.curve(name, q, side)]
             local.append(np.asarray(np.sum(each, axis=0)))
         precision += [1.0 / line.sigma_lever_mm**2] * len(angles)
+        if line.square is not None:
+            # at another place the axes at rest tilt it: without a square its slope is free anyhow
+            local.append(from_datum)
+            precision.append(1.0 / _OWN_TILT**2)
     if noise.drift > 0.0:
         ramps = drift_ramps(line)
         local += list(ramps.T)
