@@ -16,7 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from cases.joint_blunders import ALARMS, blunders, outcome
+from cases.joint_blunders import ALARMS, JointOutcome, blunders, outcome
 from cases.joint_campaigns import STRUCTURES, Campaign, instruments_of
 
 import olp
@@ -42,11 +42,12 @@ def main(seeds: int, structures: tuple[str, ...]) -> None:
                         counts["planted"] += 1
                         counts["clear effect"] += said.loud
                         counts["clear effect, silent"] += said.silent
+                        counts["clear effect, silent, told beforehand"] += said.silent and said.told
                         counts["clear effect, named"] += said.loud and said.named
                         counts["no clear effect, named"] += said.named and not said.loud
                         if said.silent or (said.loud and not said.named):
                             print(
-                                f"  {'SILENT' if said.silent else 'not named'} {structure}, {instrument}, "
+                                f"  {_word(said)} {structure}, {instrument}, "
                                 f"seed {seed}: {blunder.kind}, {said.size:.1f}, {' '.join(said.alarms)}: "
                                 f"{said.said}",
                                 flush=True,
@@ -54,6 +55,12 @@ def main(seeds: int, structures: tuple[str, ...]) -> None:
     for name, count in sorted(counts.items()):
         print(f"{name}: {count}")
     print(f"{(time.process_time() - begin) / max(1, counts['planted'] + counts['clean']):.1f} s of CPU a fit")
+
+
+def _word(said: JointOutcome) -> str:
+    if said.silent:
+        return "silent, told" if said.told else "SILENT"
+    return "not named"
 
 
 if __name__ == "__main__":

@@ -34,12 +34,14 @@ class JointBlunder:
 @dataclasses.dataclass(frozen=True)
 class JointOutcome:
     """How far the calibration is off, by what it states (infinite where there is none), the codes of findings
-    or "refused", whether the cause was named, and what was said."""
+    or "refused", whether the cause was named, and what was said. It was `told` where the report says that
+    nothing excludes this mistake, and what it costs."""
 
     size: float
     alarms: tuple[str, ...]
     named: bool
     said: str
+    told: bool = False
 
     @property
     def loud(self) -> bool:
@@ -227,7 +229,8 @@ def outcome(campaign: Campaign, blunder: JointBlunder) -> JointOutcome:
     # a single wrong value is named by its line
     said += [one.message for one in fitted.findings if one.code == "OLP802" and blunder.kind == "one value"]
     size = float(np.sqrt(np.mean(off**2) / np.mean(stated**2)))
-    return JointOutcome(size, alarms, _named(blunder, said), "; ".join(said))
+    told = _named(blunder, [one.message for one in fitted.findings if one.code == "OLP812"])
+    return JointOutcome(size, alarms, _named(blunder, said), "; ".join(said), told)
 
 
 def _named(blunder: JointBlunder, said: list[str]) -> bool:

@@ -302,11 +302,13 @@ def _unsettled(model: Model) -> CannotCompute:
     )
 
 
-def block_of(model: Model, theta: Array, start: Start, own: Array) -> Block:
-    """The rows of one instrument, linear about theta and its own unknowns."""
+def block_of(model: Model, theta: Array, start: Start, own: Array, twists: Array | None = None) -> Block:
+    """The rows of one instrument, linear about theta and its own unknowns. `twists` are those of the model
+    there, where they are known."""
     reading = start.reading
     pose = model.machine(theta, reading.payload).actual(reading.values)
-    twists = model.twists(theta, reading.values, reading.payload)
+    if twists is None:
+        twists = model.twists(theta, reading.values, reading.payload)
     predicted = start.predicted(pose, own)
     slopes = _by_pose(start, pose, own)
     rows = slopes @ twists

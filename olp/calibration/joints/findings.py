@@ -18,13 +18,16 @@ from olp.calibration.joints.adjustment import (
     starts_of,
 )
 from olp.calibration.joints.deciding import AGREES, DECIDED, log_odds, odds_in_words
-from olp.calibration.joints.mistakes import RIGHT, Mended, mistakes, row_mistakes
+from olp.calibration.joints.hidden import hidden
+from olp.calibration.joints.mistakes import RIGHT, Mended, closer, mistakes, row_mistakes
 from olp.calibration.joints.payloads import unstated_payloads
-from olp.calibration.joints.readings import Ball, Reading
+from olp.calibration.joints.readings import Reading, Start
 from olp.calibration.joints.tools import other_tools
 from olp.calibration.joints.unknowns import Model
 from olp.calibration.joints.ways import by_way
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError
+from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 
@@ -46,6 +49,8 @@ _UNUSUAL = 10.0
 _QUICK = 7
 #: At most so many names are listed.
 _NAMED = 8
+#: Smaller harm of a mistake is not listed, mm.
+_LEAST_MM = 1e-4
 #: Reduced chi-square of readings that agree better than they can.
 _QUIET = 0.1
 #: Errors of a machine with other dimensions are so many times as large as usual.
@@ -109,10 +114,12 @@ def _findings(fit: JointFit, readings: Sequence[Reading]) -> Iterator[Finding]:
             f"factor of {np.sqrt(reduced):.3g}",
         )
     noisy = reduced > 1.0 + _SUSPECT * np.sqrt(2.0 / fit.freedom)
-    if noisy or reduced < _QUIET or _strained(fit):
-        cause = _cause(fit.model, readings, fit)
-        if cause is not None:
-            yield Finding("OLP810", str(cause))
+    suspect = noisy or reduced < _QUIET or _strained(fit)
+    cause = _cause(fit.model, readings, fit) if suspect else None
+    if cause is not None:
+        yield Finding("OLP810", str(cause))
+    else:
+        yield from _hidden_findings(fit)
     held = [
         (unknown.name, sigma / unknown.prior)
         for unknown, sigma in zip(fit.model.unknowns, fit.sigma.tolist(), strict=True)
@@ -126,6 +133,21 @@ def _findings(fit: JointFit, readings: Sequence[Reading]) -> Iterator[Finding]:
             f"the readings determine {fit.determined} of {len(fit.model.unknowns)} unknowns; held by what is "
             f"usual: {names or 'combinations of them'}{more}",
         )
+
+
+def _hidden_findings(fit: JointFit) -> Iterator[Finding]:
+    """The mistake that explains readings better though they fit well, or those that nothing excludes."""
+    found = hidden(fit)
+    best = max(found, key=lambda one: one.odds, default=None)
+    if best is not None and best.odds > DECIDED:
+        before, after = fit.chi_square / fit.freedom, best.fit.chi_square / best.fit.freedom
+        yield Finding("OLP810", str(_Cause(best.words, before, after, best.odds)))
+        return
+    harms = [(one.harm_mm, one.words) for one in found if one.harm_mm > _LEAST_MM]
+    if harms:
+        words = [f"{words} ({UM_PER_MM * harm:.3g} um)" for harm, words in sorted(harms, reverse=True)]
+        more = f" and {len(words) - _NAMED} more" if len(words) > _NAMED else ""
+        yield Finding("OLP812", f"{'; '.join(words[:_NAMED])}{more}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +202,7 @@ def _explaining(
         except (CannotCompute, ConfigError):
             continue
         then = other.chi_square / other.freedom
-        odds = log_odds(stated, other.score, then) + _volume(readings, mended)
+        odds = log_odds(stated, other.score, then) + closer(readings, mended)
         explains = then < (max(AGREES, share * before) if np.isfinite(before) else _PLAUSIBLE)
         if explains and odds > DECIDED:
             found.append(_Cause(words, before, then, odds))
@@ -195,7 +217,7 @@ def _worth_a_fit(model: Model, readings: Sequence[Reading], offers: Sequence[Men
     least = now if np.isfinite(now) else min(far, default=now)
     worst = max(_WORSE * least, _UNUSUAL * _usual(model, readings))
     for offer, away in zip(offers, far, strict=True):
-        if away <= worst or _volume(readings, offer[1]) > 0.0:
+        if away <= worst or closer(readings, offer[1]) > 0.0:
             yield offer
 
 
@@ -238,17 +260,6 @@ def _other_dimensions(
     return _Cause(words, before, reduced, odds)
 
 
-def _volume(readings: Sequence[Reading], mended: Sequence[Reading]) -> float:
-    """By how much the log of the odds grows where balls are read in a larger unit than stated: readings lie
-    closer together than noise has them."""
-    whole = 0.0
-    for one, other in zip(readings, mended, strict=True):
-        if isinstance(one, Ball) and isinstance(other, Ball) and one.count == other.count:
-            before, after = (float(np.linalg.norm(each.measured_mm)) for each in (one, other))
-            whole += one.measured_mm.size * float(np.log(after / before)) if before and after else 0.0
-    return whole
-
-
 def _nominal(model: Model, readings: Sequence[Reading]) -> float:
     """Chi-square of readings with the machine as known before them; infinite where they do not settle."""
     try:
@@ -284,13 +295,10 @@ def without_worst(model: Model, readings: Sequence[Reading], below: float) -> Jo
             fit = adjusted(model, starts)
             if out and fit.chi_square / fit.freedom < below:
                 return replace(fit, left_out=tuple(out))
+            off = [np.abs(source.residual / source.start.sigma).max(axis=1) for source in fit.sources]
         except CannotCompute:
             # what keeps the unknowns from settling is far off the nominal machine, too
-            try:
-                fit = adjusted(replace(model, unknowns=(), known=None), starts)
-            except CannotCompute:
-                return None
-        off = [np.abs(source.residual / source.start.sigma).max(axis=1) for source in fit.sources]
+            off = [_off_nominal(model, start) for start in starts]
         index = int(np.argmax([one.max() for one in off]))
         row = int(np.argmax(off[index]))
         reading = starts[index].reading
@@ -299,3 +307,11 @@ def without_worst(model: Model, readings: Sequence[Reading], below: float) -> Jo
         out.append(LeftOut(reading.source, int(reading.row[row]), float(off[index][row])))
         starts[index] = starts[index].only(np.arange(reading.count) != row)
     return None
+
+
+def _off_nominal(model: Model, start: Start) -> Array:
+    """(n,) by how many standard deviations readings are off the nominal machine, beside most others."""
+    reading = start.reading
+    pose = model.machine(np.zeros(len(model.unknowns))).nominal(reading.values)
+    off = start.measured - start.predicted(pose, np.zeros(len(start.prior)))
+    return np.asarray((np.abs(off - np.median(off, axis=0)) / start.sigma).max(axis=1))
