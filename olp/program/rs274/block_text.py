@@ -20,9 +20,14 @@ PLAIN = b"\t\n" + bytes(range(0x20, 0x7F))
 #: Control characters but tab and those of line ends.
 CONTROL = pattern(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")
 _COMMENTS = pattern(rb"\([^)]*\)?|;.*", re.DOTALL)
-#: A comment with brackets in it that closes right behind them, as in `(a (b))`: nothing is outside of it,
-#: whether the first `)` ends it or the last.
-CLOSED_TOGETHER = rb"\([^()\r\n]*(?:\([^()\r\n]*\)[ \t]*)+\)"
+#: Text that no control takes for a block: a number without a letter, or a word of letters alone.
+_NO_BLOCK = (
+    rb"(?:[\d\"]|(?!(?i:IF|WHILE|WH|DO|END|THEN|ELSE|GOTO|CALL|RTS|MODIN|MODOUT|NOEX|POPEN|PCLOS)\b)"
+    rb"[A-Za-z]{2,}(?![\w=\[#]))[^()\r\n]*"
+)
+#: A comment with brackets in it, as in `(a (b))` or `(a (b) to (c))`. Where the first `)` ends it, nothing is
+#: outside of it but what makes the control refuse the block; so a control that runs it ends it at the last.
+CLOSED_TOGETHER = rb"\([^()\r\n]*(?:\([^()\r\n]*\)[ \t]*(?:" + _NO_BLOCK + rb")?)+\)"
 _WHOLE = pattern(CLOSED_TOGETHER + b"|" + _COMMENTS.pattern, re.DOTALL)
 #: Statements of Macro B that write to a file or a line of the control, with `/` and N.
 PRINTS = (
@@ -49,7 +54,7 @@ class BlockText:
     - `skips_control`: control characters mean nothing, as blanks; else they are refused outside comments.
     - `cr_ends_line`: a lone carriage return ends a line.
     - `open_comments`: a comment that is not closed ends with its line. `nested_comments`: `(` may be in one.
-      `inner_brackets`: brackets may be in one and close right before it, as in `(a (b))`.
+      `inner_brackets`: brackets may be in one and close before it, as in `(a (b))` (`CLOSED_TOGETHER`).
     - `brackets`: `(` opens a comment; else a line with one is refused.
     - `marks_in_pairs`: `%` is the first line and the last one, alone in its line, or not there.
     - `unread`: words that mean nothing for the path and have no letter, such as the number of a spindle; its

@@ -65,12 +65,8 @@ OPEN_RETRACT = (
 )
 
 
-#: What to do where a position is not known.
-KNOWN_BY = (
-    "command X, Y and Z first, or give a machine file and a job file with start_mm. Where G28, G30 and M6 "
-    "leave the axes is stated by home_mm, second_home_mm and tool_change_mm of the machine file, and which "
-    "other M codes move no axis by still_m_codes"
-)
+#: What to do where a position is not known; where a block took it, `departures` names that block.
+KNOWN_BY = "command X, Y and Z first, or give a machine file and a job file with start_mm"
 
 
 @dataclass(slots=True)

@@ -13,7 +13,7 @@ from cases.blocks import OFFSETS, TOOLS, program, refusal, setup_of
 from olp.core.machine import Setup
 from olp.core.toolpath import CutterCompensation, Flag, Frame, LengthError
 from olp.program.program import Program
-from olp.program.rs274.state import KNOWN_BY, Capture, PathMode
+from olp.program.rs274.state import Capture, PathMode
 
 ALL = ("linuxcnc", "fanuc", "haas", "grbl")
 HEAD = "G21 G90 G17 G54\nG0 X1. Y2. Z3.\n"
@@ -335,7 +335,11 @@ BESIDE = "a tool length beside M6 is that of the tool before the change; put it 
 DWELL = "a dwell and a motion are in one block; put the dwell into its own block"
 TABLE = "is not a number of a table; expected an integer from 0"
 NUMBER = "G10 needs a P word with the number of a work offset, 1 for G54"
-POSITION = f"is stored as the present position, but the axis has not been commanded yet; {KNOWN_BY}"
+POSITION = (
+    "is stored as the present position, but the axis has not been commanded yet; M100 in line 3 may have "
+    "moved it: list 100 in still_m_codes of the machine file if it moves no axis, or command X, Y and Z "
+    "behind it"
+)
 LOST = (
     "with G92 in force, which the control does not count there: it loses the position in this block; "
     "give G92.1 before it"

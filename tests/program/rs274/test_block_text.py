@@ -87,6 +87,13 @@ REFUSALS: list[tuple[bytes, dict[str, Any], tuple[str, str] | None]] = [
     (b"(a (b)", {"inner_brackets": True}, None),
     (b"(a (b) c)", {"inner_brackets": True}, doubly_closed("(a (b) c)")),
     (b"(a (b) X2 (c))", {"inner_brackets": True}, doubly_closed("(a (b) X2 (c))")),
+    (b"(at (1.5, 2) to (3, 4) )", {"inner_brackets": True}, None),
+    (b'(a (b) 3/8" c (d) e) mm)', {"inner_brackets": True}, doubly_closed('(a (b) 3/8" c (d) e) mm)')),
+    (b'(a (b) 3/8" c (d)) X1', {"inner_brackets": True}, None),
+    (b"(a (b) to)", {}, doubly_closed("(a (b) to)")),
+    (b"(a (b) GOTO 5)", {"inner_brackets": True}, doubly_closed("(a (b) GOTO 5)")),
+    (b"(a (b) VC5=1)", {"inner_brackets": True}, doubly_closed("(a (b) VC5=1)")),
+    (b"(a (b) to (c) X5)", {"inner_brackets": True}, doubly_closed("(a (b) to (c) X5)")),
     (b"(a (b)))", {"inner_brackets": True}, doubly_closed("(a (b)))")),
     (b"(a (b)) (c", {"inner_brackets": True}, unclosed("(c")),
 ]  # fmt: skip

@@ -253,7 +253,7 @@ def test_lines_that_a_control_refuses_are_odd(text: str, rules: dict[str, object
 
 
 def test_brackets_in_a_comment_may_close_right_before_it() -> None:
-    text = b"X1 (a (b)) Y2\n(a (b) (X9)\t) X3 (c (X8) )\n(a (b) X4)\n(d) Y5\n"
+    text = b"X1 (a (b)) Y2\n(a (b) (X9)\t) X3 (c (X8) to 1)\n(a (b) X4)\n(d) Y5\n"
     chunk = next(chunks(text, BlockText(inner_brackets=True)))
     assert chunk.odd.tolist() == [2]
     words = [(int(n), text[a:b]) for n, a, b in zip(chunk.line, chunk.start, chunk.end, strict=True)]

@@ -13,7 +13,6 @@ from olp.core.machine import Setup
 from olp.core.toolpath import Flag
 from olp.program.rs274 import reader
 from olp.program.rs274.lexer import chunks
-from olp.program.rs274.state import KNOWN_BY
 
 ALL = ("linuxcnc", "fanuc", "haas", "grbl")
 PASS, DELETED, CYCLE, WHOLE = Flag.PASS, Flag.DELETED, Flag.CYCLE, Flag.WHOLE
@@ -262,7 +261,11 @@ _LISTED = (
 )
 OR_LISTED = f"{ALONE}, or {_LISTED}"
 NO_MOTION = "a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3"
-UNKNOWN = f"an arc starts or ends where an axis has not been commanded yet; {KNOWN_BY}"
+UNCOMMANDED = "an arc starts or ends where an axis has not been commanded yet"
+BY_M100 = (
+    "M100 in line 3 may have moved it: list 100 in still_m_codes of the machine file if it moves no axis, or "
+    "command X, Y and Z behind it"
+)
 #: Control and text behind `HEAD`: the line, the sentence, the code, and what else the refusal names.
 REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("fanuc", "#1=2"): {"why": parametric("#1=2"), "code": "OLP511", "hint": UNROLL},
@@ -342,7 +345,9 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
         "why": f"M70 saves modal codes; {UNROLL}", "code": "OLP511", "hint": UNROLL, "word": "M70",
     },
     ("linuxcnc", "G80\nX1\n\nY1"): {"why": NO_MOTION, "code": "OLP517", "line": 4, "others": (6,)},
-    ("linuxcnc", "M100\nG2 X1 Y1 R4"): {"why": UNKNOWN, "code": "OLP524", "line": 4},
+    ("linuxcnc", "M100\nG2 X1 Y1 R4"): {
+        "why": f"{UNCOMMANDED}; {BY_M100}", "code": "OLP524", "line": 4,
+    },
     ("linuxcnc", "G1 X5\nX5 X6\nY1 Y1"): {
         "why": "the word X is twice in this block; expected it once", "code": "OLP515", "line": 4,
         "others": (5,),
@@ -387,7 +392,7 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
         "why": "the block makes 20001 holes; expected at most 20000", "code": "OLP543",
     },
     ("linuxcnc", "M100\nG81 X1 R2 Z1"): {
-        "why": f"a canned cycle starts where an axis has not been commanded yet; {KNOWN_BY}",
+        "why": f"a canned cycle starts where an axis has not been commanded yet; {BY_M100}",
         "code": "OLP524", "line": 4,
     },
     ("fanuc", "G81 X1. R2. Z1.\nG55\nX2."): {

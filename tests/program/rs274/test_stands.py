@@ -119,6 +119,29 @@ def test_an_unread_value_is_refused(tmp_path: Path) -> None:
         corrected(tmp_path, "M2", keys='tool_change_moves = ["A"]\n')
 
 
+#: What a refusal says of the block that left the axes, and what to do about it.
+BY_KEY = "; {name} in line {line} may have moved it: {do}, or command X, Y and Z behind it"
+LIST = "list {} in still_m_codes of the machine file if it moves no axis"
+STATE = "state {} in the machine file"
+ARC = "G0 X10. Y10. Z9.\n{}\nG2 X30. Y10. I10. J0.\n"
+LEAVERS = [
+    ("M81\nG0 X3. Y3. Z3.\nM9\nM82", "M82", 7, LIST.format(82)),
+    ("M6 T1", "M6", 4, STATE.format("tool_change_mm")),
+    ("M6 T1\nM82\nG54", "M82", 5, LIST.format(82)),
+    ("G28 X10.", "G28", 4, STATE.format("home_mm")),
+    ("M82\nG30 X10.", "G30", 5, STATE.format("second_home_mm")),
+]
+
+
+@pytest.mark.parametrize(("between", "name", "line", "do"), LEAVERS)
+def test_a_refusal_names_the_block_that_left_the_axes(
+    tmp_path: Path, between: str, name: str, line: int, do: str
+) -> None:
+    with pytest.raises(ProgramError) as caught:
+        corrected(tmp_path, ARC.format(between))
+    assert caught.value.message.endswith(BY_KEY.format(name=name, line=line, do=do))
+
+
 BUILDERS = "G0 X10. Y10. Z9.\nM81\nG1 X30. F100\nG2 X30. Y30. I0. J10.\nM5 M110\nG1 Z1.\n"
 
 
@@ -132,7 +155,7 @@ def test_codes_of_the_builder_that_move_nothing_are_stated(tmp_path: Path, contr
         keys += points + 'arc_centres = "incremental"\n'
         return corrected(tmp_path / name, text, keys=keys, controller=controller, head=head)
 
-    with pytest.raises(ProgramError, match="which other M codes move no axis by still_m_codes") as caught:
+    with pytest.raises(ProgramError, match=BY_KEY.format(name="M81", line=4, do=LIST.format(81))) as caught:
         of("unknown", BUILDERS)
     assert (caught.value.line, caught.value.code) == (6, "OLP524")
     stated = of("stated", BUILDERS, "still_m_codes = [110, 81]\n")

@@ -46,6 +46,7 @@ from olp.program.rs274.cycles import (
     cycle_moves,
     levels,
 )
+from olp.program.rs274.departures import departure
 from olp.program.rs274.flatten.expressions import whole
 from olp.program.rs274.flatten.language import Language
 from olp.program.rs274.flatten.lines import Word
@@ -102,6 +103,8 @@ class ProgramState(State):
     tool_change_axes: tuple[int, ...] = (0, 1, 2)
     #: where axes stand that nothing has moved yet
     start: Start | None = None
+    #: what left axes at a place that is not known, and the key that helps (`departure`)
+    left: tuple[str, str] | None = None
 
     @staticmethod
     def of(profile: Profile, setup: Setup | None) -> ProgramState:
@@ -117,9 +120,12 @@ class ProgramState(State):
         if math.isnan(value) and self.start is not None and not self.odd_frame:
             value = self.start.position_mm(axis) / self.unit_mm
         if math.isnan(value) or self.compensated:
+            command = f"command {AXES[axis]} before in the program"
+            if self.left is not None:
+                name, remedy = self.left
+                command = f"{name} before it may have moved it: {remedy}, or command {AXES[axis]} behind it"
             raise ProgramError(
-                f"the position of {AXES[axis]} is needed here and not known off line; "
-                f"command {AXES[axis]} before in the program",
+                f"the position of {AXES[axis]} is needed here and not known off line; {command}",
                 code="OLP524",
             )
         return value
@@ -196,6 +202,8 @@ class ProgramState(State):
         if code in profile.still_m or (profile.m61_sets_tool and code == SET_TOOL):
             return
         moved = self.tool_change_axes if code == TOOL_CHANGE else (0, 1, 2)
+        # no key says where a tool change leaves the words of a program that is unrolled
+        self.left = departure((), {code} - {TOOL_CHANGE})
         self.forget(moved)
         if self.start is not None:
             self.start.moved(moved)
@@ -206,6 +214,8 @@ class ProgramState(State):
             self.forget()
         unsetting = codes & _UNSETTING
         self.series.broken |= bool(unsetting) or PRESET in codes
+        if unsetting:
+            self.left = None
         along_z = self.profile.lengths_along_z and unsetting <= TABLE_LENGTHS
         if unsetting and along_z and not self.odd_frame:
             self.forget((2,))

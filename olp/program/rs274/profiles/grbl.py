@@ -50,7 +50,10 @@ DIALECT = Profile(
     initial_retract=990,
     g10_active=True,
     machine_moves_absolute=True,
-    text=BlockText(odd_bytes=None, cr_ends_line=True, open_comments=True, outside=_OUTSIDE),
+    # senders take comments out before they send a line
+    text=BlockText(
+        odd_bytes=None, cr_ends_line=True, open_comments=True, inner_brackets=True, outside=_OUTSIDE
+    ),
     cycles=replace(NGC_CYCLES, exact_corners=False),
     inert=_ASKS,
     # grblHAL saves modes
