@@ -20,9 +20,10 @@ PLAIN = b"\t\n" + bytes(range(0x20, 0x7F))
 #: Control characters but tab and those of line ends.
 CONTROL = pattern(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")
 _COMMENTS = pattern(rb"\([^)]*\)?|;.*", re.DOTALL)
-#: Text that no control takes for a block: a number without a letter, or a word of letters alone.
+#: Text that no control takes for a block: a number without a letter, signs in a row, or a word of letters
+#: alone.
 _NO_BLOCK = (
-    rb"(?:[\d\"]|(?!(?i:IF|WHILE|WH|DO|END|THEN|ELSE|GOTO|CALL|RTS|MODIN|MODOUT|NOEX|POPEN|PCLOS)\b)"
+    rb"(?:[\d\"]|={2,}|-{3,}|(?!(?i:IF|WHILE|WH|DO|END|THEN|ELSE|GOTO|CALL|RTS|MODIN|MODOUT|NOEX|POPEN|PCLOS)\b)"
     rb"[A-Za-z]{2,}(?![\w=\[#]))[^()\r\n]*"
 )
 #: A comment with brackets in it, as in `(a (b))` or `(a (b) to (c))`. Where the first `)` ends it, nothing is

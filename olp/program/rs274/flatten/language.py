@@ -31,8 +31,8 @@ class Language:
     - `counts_in_p`: P of M98 has the count in front of four digits of the number. `shared_locals`: M98 keeps
       the local variables of its caller. `calls_none`: L0 of M98 calls nothing. `calls_at_q`: Q of M98 is the
       block at which the subprogram begins, in the same program without P.
-    - `increments_open`: the unit of a number without a point is not known off line, nor what ROUND in a word
-      rounds to.
+    - `increments_open`: the unit of a number without a point is not known off line. `rounds_words`: ROUND in
+      a word rounds to the least increment, which is not known either.
     - Numbers are written with at most `decimals`, or with `all_digits` where that is needed; `counts` are
       letters of integers, `points` whether others get a point.
     """
@@ -55,6 +55,7 @@ class Language:
     calls_none: bool
     calls_at_q: bool = False
     increments_open: bool
+    rounds_words: bool = False
     decimals: int
     all_digits: bool
     counts: frozenset[str]
@@ -73,8 +74,8 @@ PLAIN_NGC = replace(
 MACRO_B = Language(
     arithmetic=expressions.MACRO_B, macro_b=True, work_offsets=True, modal_variables=True, saved_modes=False,
     profile_cycles=False, splines=False, counts_in_p=True, shared_locals=True, calls_none=False,
-    increments_open=True, decimals=4, all_digits=False, counts=frozenset("gmnpltdhos"), points=True,
-    corners=frozenset({",r", ",c"}),
+    increments_open=True, rounds_words=True, decimals=4, all_digits=False, counts=frozenset("gmnpltdhos"),
+    points=True, corners=frozenset({",r", ",c"}),
 )  # fmt: skip
 USER_TASKS = replace(
     MACRO_B, arithmetic=expressions.USER_TASKS, user_tasks=True, modal_variables=False, work_offsets=False,

@@ -213,7 +213,7 @@ def _word(reader: Reader, places: list[int], language: Language) -> Word:
         reader.position = value_start
         number, value, pointed = 0.0, reader.value(), False
         written = text[value_start : reader.position]
-        if language.increments_open and ("round[" in written or "rnd[" in written):
+        if language.rounds_words and ("round[" in written or "rnd[" in written):
             raise ProgramError(
                 "ROUND inside a word rounds to the least increment, which is not known here; "
                 "assign the rounded value to a variable first",

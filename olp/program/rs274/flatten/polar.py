@@ -119,7 +119,7 @@ def _position(
 ) -> list[tuple[int, int, bytes]]:
     """The splices that write the position of a block."""
     for word in axes.values():
-        if not word.pointed and word.number and profile.increments_without_point:
+        if not word.pointed and word.number and profile.language.increments_open:
             raise ProgramError(
                 f"{word.letter.upper()} has no decimal point, so the machine decides what it counts; "
                 "write it with a point",

@@ -358,7 +358,8 @@ class ProgramState(State):
         if value is None:
             raise ProgramError(
                 f"{letter} has no decimal point, so a parameter of the control decides whether it counts "
-                "least increments or whole units; write the point",
+                'least increments or whole units; write the point, or state decimal_point = "calculator" in '
+                "the machine file where the control is set so",
                 code="OLP541",
             )
         return value

@@ -70,6 +70,7 @@ class Variables:
         self.tools = ToolVariables(state, setup if state.profile.language.tool_variables else None)
         self.modal = ModalVariables()
         self.tasks = state.profile.language.user_tasks
+        self.units_known = not state.profile.language.increments_open
         names = {_bare(name, tasks=self.tasks): value for name, value in (given or {}).items()}
         self.given = {self._one(int(name)): value for name, value in names.items() if name.isdigit()}
         self.given_names = {name: value for name, value in names.items() if not name.isdigit()}
@@ -290,6 +291,11 @@ class Variables:
             )
 
 
+def _feed_is_whole(state: ProgramState) -> bool:
+    """Whether F without a point is in units per minute, whatever the least increment of lengths is."""
+    return state.profile.feed_without_point and state.feed_mode == _FEED_MODES["_units_per_minute"]
+
+
 def macro_arguments(line: Line, variables: Variables) -> Iterator[tuple[int, float | None]]:
     """(variable, value) of G65's words; I, J, K may come in several sets, as in argument list II."""
     group, last = 0, ""
@@ -302,10 +308,12 @@ def macro_arguments(line: Line, variables: Variables) -> Iterator[tuple[int, flo
                 f"G65 has the argument {letter.upper()}, which is not an argument of a macro", code="OLP516"
             )
         value = word.number if word.value is None else word.value(variables)
-        if word.value is None and not word.pointed and value != 0 and letter not in _COUNT_ARGUMENTS:
+        counts = letter in _COUNT_ARGUMENTS or (letter == "f" and _feed_is_whole(variables.state))
+        if word.value is None and not (word.pointed or counts or variables.units_known) and value != 0:
             raise ProgramError(
                 f"the argument {letter.upper()} has no decimal point, so the control scales it by its least "
-                "increment; write the point",
+                'increment; write the point, or state decimal_point = "calculator" in the machine file where '
+                "the control is set so",
                 code="OLP516",
             )
         index = _ARGUMENTS[letter]

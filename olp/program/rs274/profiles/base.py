@@ -306,8 +306,10 @@ class Profile(Dialect):
             profile = replace(profile, still_g=machine.still_g_codes)
         if machine.bracket_comments and self.brackets_by_option:
             profile = replace(profile, text=replace(self.text, brackets=True))
-        if self.language.user_tasks and not self.counts_increments(machine):
-            profile = replace(profile, language=replace(self.language, increments_open=False))
+        if self.language.increments_open and not self.counts_increments(machine):
+            rounds = self.language.rounds_words and not self.language.user_tasks
+            language = replace(self.language, increments_open=False, rounds_words=rounds)
+            profile = replace(profile, language=language)
         return profile
 
     def codes_of(self, act: Act) -> frozenset[int]:

@@ -29,6 +29,11 @@ DIALECT = replace(
     g10_stores=False,
     offset_words={**MACH3.offset_words, 541: "P"},
     language=replace(
-        MACRO_B, modal_variables=False, work_offsets=False, counts_in_p=False, increments_open=False
+        MACRO_B,
+        modal_variables=False,
+        work_offsets=False,
+        counts_in_p=False,
+        increments_open=False,
+        rounds_words=False,
     ),
 )

@@ -5,6 +5,10 @@ from __future__ import annotations
 import pytest
 from cases.unrolling import fanuc, flatten, lcnc, refused
 
+from olp.core.errors import ProgramError
+from olp.core.machine import Axis, Machine
+from olp.program.registry import named
+
 _BY_CONTROL = "and no plain block has the effect of setting it"
 _WAY_ON = 'give it in the job file: [parameters] "{}" = ...'
 _KEPT = "is kept by the control (probe result, offset, tool or position) and not known off line"
@@ -280,6 +284,8 @@ def test_each_argument_of_a_macro_has_its_variable() -> None:
         ("K1. I2. K3.", {6: 1, 7: 2, 9: 3}),
         ("J1. A5. J2.", {5: 1, 1: 5, 8: 2}),
         ("J1. J2. I3.", {5: 1, 8: 2, 10: 3}),
+        # F counts units per minute
+        ("F800", {9: 800}),
         # no point is needed by zero, by an expression, and by counts
         ("A0 B[1+1] D3 H4 M5 S6 T7", {1: 0, 2: 2, 7: 3, 11: 4, 13: 5, 19: 6, 20: 7}),
         ("A1. A2.", {1: 2}),
@@ -297,10 +303,36 @@ def test_arguments_of_a_macro(call: str, values: dict[int, float]) -> None:
     ("word", "message"),
     [
         *((f"{letter}5", f"the argument {letter} has no decimal point, so the control scales it by its least "
-           "increment; write the point") for letter in "ABCIJKEFQRUVWXYZ"),
+           'increment; write the point, or state decimal_point = "calculator" in the machine file where the '
+           "control is set so") for letter in "ABCIJKEQRUVWXYZ"),
         ("@5.", "G65 has the argument @, which is not an argument of a macro"),
         (",R5.", "G65 has the argument ,R, which is not an argument of a macro"),
     ],
 )  # fmt: skip
 def test_arguments_of_a_macro_that_are_refused(word: str, message: str) -> None:
     assert refused(f"O1\nG65 P2 {word}\nM30\nO2\nM99\n", "fanuc") == ("OLP516", message, 2)
+
+
+def test_an_argument_counts_a_feed_per_revolution_by_an_increment_that_is_not_known() -> None:
+    program = "O1\nG95\nG65 P2 F5\nM30\nO2\nM99\n"
+    assert refused(program, "fanuc")[1].startswith("the argument F has no decimal point")
+
+
+@pytest.mark.parametrize("call", ["A1 E41 R-2 F3", "A1. E41. R-2. F3."])
+def test_a_control_whose_numbers_are_whole_units_passes_them_to_macros(call: str) -> None:
+    """As it does where they have a point."""
+    machine = Machine(
+        name="m", chain="FXYZ", controller="fanuc", decimal_point="calculator",
+        axes={a: Axis(travel_mm=(-100.0, 100.0), least_increment_mm=0.001) for a in "XYZ"},
+    )  # fmt: skip
+    control = named("fanuc").set_as(machine)
+
+    def unrolled(text: str) -> str:
+        assert control.unroller is not None
+        return control.unroller(text.encode(), control).decode()
+
+    read = unrolled(f"O1\nG95\nG65 P2 {call}\nM30\nO2\nG1 X#1 Y#8 Z#18 F#9\nM99\n")
+    assert read == "O1\nG95\nG1 X1. Y41. Z-2. F3.\nM30\n"
+    assert unrolled("O1\nG81 Z-1 R2 F9\nM30\n").startswith("O1\n")
+    with pytest.raises(ProgramError, match="ROUND inside a word rounds to the least increment"):
+        unrolled("O1\n#1=1\nG1 X[ROUND[#1]]\nM30\n")
