@@ -16,7 +16,10 @@ from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 
 _COMMENT = re.compile(rb'(?:[^";]|"[^"]*"?)*')
-_HEAD = re.compile(rb"[ \t]*(?:/(\d?)[ \t]*)?(?:[N:][ \t]*(\d+)(?![\d.]))?[ \t]*", re.IGNORECASE)
+#: What comes before the words of a line; a byte order mark is before those of the first.
+_HEAD = re.compile(
+    rb"(?:\xef\xbb\xbf)?[ \t]*(?:/(\d?)[ \t]*)?(?:[N:][ \t]*(\d+)(?![\d.]))?[ \t]*", re.IGNORECASE
+)
 _LABEL = re.compile(rb"([A-Z_][A-Z0-9_]+)[ \t]*:(?!=)[ \t]*", re.IGNORECASE)
 NUMBER = re.compile(rb"[+-]?[ \t]*(?:\d+\.?\d*|\.\d+)")
 _WORD = re.compile(

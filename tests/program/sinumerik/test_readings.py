@@ -417,3 +417,11 @@ def test_numbers_with_a_sign_are_read_in_columns() -> None:
     # at both ends of a text
     assert translate(b"X=5 Y=2").text == b"X 5 Y 2"
     assert translate(b"G2\nX1 CR=2.").text == b"G2\nX1 R  2."
+
+
+def test_a_byte_order_mark_before_the_first_line_is_no_word(setup: Setup) -> None:
+    text = b"\xef\xbb\xbfG71 G90\nR1=5\nG0 X=R1 Y0 Z0\nM30\n"
+    unrolled = flatten(text, SINUMERIK)
+    assert unrolled.startswith(b"\xef\xbb\xbfG71 G90\n")
+    assert read(unrolled, setup, SINUMERIK).toolpath.end_mm[-1].tolist() == [5.0, 0.0, 0.0]
+    assert end("\N{ZERO WIDTH NO-BREAK SPACE};a\nG71 G0 X1 Y2 Z3\nM30\n", setup) == [1.0, 2.0, 3.0]

@@ -10,7 +10,9 @@ from olp.core.values import dataclass
 from olp.program.sinumerik.blocks import Block, block_of, without_comment
 
 _END = re.compile(rb"\r*\n?\Z")
-_HEAD = re.compile(r"[ \t]*/?\d?[ \t]*(?:N\d+)?[ \t]*(?:[A-Z_][A-Z0-9_]+[ \t]*:(?!=)[ \t]*)*", re.IGNORECASE)
+_HEAD = re.compile(
+    r"(?:\xef\xbb\xbf)?[ \t]*/?\d?[ \t]*(?:N\d+)?[ \t]*(?:[A-Z_][A-Z0-9_]+[ \t]*:(?!=)[ \t]*)*", re.IGNORECASE
+)
 _KEYWORD = re.compile(
     r"(IF|ELSE|ENDIF|FOR|ENDFOR|WHILE|ENDWHILE|LOOP|ENDLOOP|REPEAT|REPEATB|UNTIL|CASE|GOTO[FBCS]?|DEF|PROC|(?:EXT)?CALL|RET)"
     r"(?![A-Z0-9_])[ \t]*",
