@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import field
 
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
@@ -74,6 +75,8 @@ _EVEN_FRAME = frozenset({80, 130, 131, 150, 490, 500, 501, 690})
 #: Codes whose axis words are no motion, or a motion to another position.
 NO_AXES = HOMES | {DWELL, WRITE_OFFSET, LOCAL_OFFSET, PRESET, MACHINE, MACRO}
 _STOPS = frozenset({0, 1, 2, 30, 60, 98, 99})
+#: What left an axis at a tool change. Where that is in words, `tool_change_mm` does not say.
+_BY_TOOL_CHANGE = ("M6", "state in tool_change_moves of the machine file which axes it moves")
 #: Words that belong to a cycle.
 CYCLE_WORDS = frozenset({"x", "y", "z", "r", "q", "p", "l", "k"})
 
@@ -103,8 +106,8 @@ class ProgramState(State):
     tool_change_axes: tuple[int, ...] = (0, 1, 2)
     #: where axes stand that nothing has moved yet
     start: Start | None = None
-    #: what left axes at a place that is not known, and the key that helps (`departure`)
-    left: tuple[str, str] | None = None
+    #: by axis, what left it at a place that is not known, and the key that helps (`departure`)
+    left: dict[int, tuple[str, str]] = field(default_factory=dict)
 
     @staticmethod
     def of(profile: Profile, setup: Setup | None) -> ProgramState:
@@ -121,8 +124,8 @@ class ProgramState(State):
             value = self.start.position_mm(axis) / self.unit_mm
         if math.isnan(value) or self.compensated:
             command = f"command {AXES[axis]} before in the program"
-            if self.left is not None:
-                name, remedy = self.left
+            if axis in self.left:
+                name, remedy = self.left[axis]
                 command = f"{name} before it may have moved it: {remedy}, or command {AXES[axis]} behind it"
             raise ProgramError(
                 f"the position of {AXES[axis]} is needed here and not known off line; {command}",
@@ -202,8 +205,8 @@ class ProgramState(State):
         if code in profile.still_m or (profile.m61_sets_tool and code == SET_TOOL):
             return
         moved = self.tool_change_axes if code == TOOL_CHANGE else (0, 1, 2)
-        # no key says where a tool change leaves the words of a program that is unrolled
-        self.left = departure((), {code} - {TOOL_CHANGE})
+        found = departure((), {code}) if code != TOOL_CHANGE else _BY_TOOL_CHANGE
+        self.left |= dict.fromkeys(moved, found) if found is not None else {}
         self.forget(moved)
         if self.start is not None:
             self.start.moved(moved)
@@ -215,7 +218,7 @@ class ProgramState(State):
         unsetting = codes & _UNSETTING
         self.series.broken |= bool(unsetting) or PRESET in codes
         if unsetting:
-            self.left = None
+            self.left = {}
         along_z = self.profile.lengths_along_z and unsetting <= TABLE_LENGTHS
         if unsetting and along_z and not self.odd_frame:
             self.forget((2,))
@@ -224,6 +227,7 @@ class ProgramState(State):
 
     def _move(self, given: dict[int, float | None]) -> None:
         for axis, value in given.items():
+            self.left.pop(axis, None)
             if self.motion not in LINEAR | SPLINES or value is None:
                 self.position[axis] = NAN
             elif self.absolute:

@@ -271,12 +271,16 @@ def test_a_cycle_that_reverses_needs_a_direction(before: str) -> None:
         ("G81 X2 Z-1 R1\nG0 X3\nG81 X4", "OLP531", "the canned cycle has no R word"),
         ("G81 X2 Z-1 R1\nG80\nG81 X4", "OLP531", "the canned cycle has no R word"),
         ("M6\nG81 X2 Y2 Z-1 R1", "OLP524",
-         "the position of Z is needed here and not known off line; command Z before in the program"),
+         "the position of Z is needed here and not known off line; M6 before it may have moved it: state in "
+         "tool_change_moves of the machine file which axes it moves, or command Z behind it"),
         ("M100\nX2\nG81 Y2 Z-1 R1", "OLP524",
          "the position of Z is needed here and not known off line; M100 before it may have moved it: list "
          "100 in still_m_codes of the machine file if it moves no axis, or command Z behind it"),
         ("M100\nG28\nX5 Z5\nG81 X2 Z-1 R1", "OLP524",
          "the position of Y is needed here and not known off line; command Y before in the program"),
+        # it was commanded behind that
+        ("M100\nX2 Y1 Z5\nG2 X4 I1\nG81 Y2 Z-1 R1", "OLP524",
+         "the position of X is needed here and not known off line; command X before in the program"),
         ("G28\nZ5\nG81 X2 Z-1 R1", "OLP524",
          "the position of Y is needed here and not known off line; command Y before in the program"),
     ],
