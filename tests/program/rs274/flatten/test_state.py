@@ -278,9 +278,6 @@ def test_a_cycle_that_reverses_needs_a_direction(before: str) -> None:
          "100 in still_m_codes of the machine file if it moves no axis, or command Z behind it"),
         ("M100\nG28\nX5 Z5\nG81 X2 Z-1 R1", "OLP524",
          "the position of Y is needed here and not known off line; command Y before in the program"),
-        # it was commanded behind that
-        ("M100\nX2 Y1 Z5\nG2 X4 I1\nG81 Y2 Z-1 R1", "OLP524",
-         "the position of X is needed here and not known off line; command X before in the program"),
         ("G28\nZ5\nG81 X2 Z-1 R1", "OLP524",
          "the position of Y is needed here and not known off line; command Y before in the program"),
     ],
@@ -381,6 +378,9 @@ _NO_POINT = (
         ("G81 X2. Z-1. R1. K0", "OLP531", "a canned cycle with zero repeats stores its values, and whether "
          "it goes to its place is not known; leave the place out"),
         ("G83 X2. Z-1. R1. Q2", "OLP541", _NO_POINT.format("Q")),
+        # X was commanded behind M100, by a number whose unit is open
+        ("M100\nX2. Y1. Z5.\nX4\nG81 Y2. Z-1. R1.", "OLP524",
+         "the position of X is needed here and not known off line; command X before in the program"),
         *((f"G{code} X2. Z-1. R1.", "OLP544",
            "G74 and G84 are synchronised by the control, and it stops the spindle of G76 and G87 at an "
            "angle: plain moves cannot replace them") for code in (74, 76, 84, 87)),
