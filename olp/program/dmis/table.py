@@ -85,7 +85,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
         (_X, "of scans, which are left uncorrected: the surface decides where the probe goes"),
     ),
     b"SCAN": (_NO, _SCAN),
-    b"PAUSE": (_NO, "stops on some controls, and is not of the standard; write DMESW/PAUSE"),
+    b"PAUSE": (_X, "stops for the operator on some controls, as DMESW/PAUSE does; not of the standard"),
     **dict.fromkeys((b"JUMPTO", b"SELECT", b"CASE", b"ENDCAS", b"DFTCAS", b"ENDSEL"), (_NO, _JUMP)),
     **dict.fromkeys((b"XTERN", b"INCLUD"), (_NO, "runs another file; put its statements into this program")),
     **dict.fromkeys((b"LOCATE", b"ITERAT", b"BFSET", b"PTBUFF", b"RESUME"), (_NO, _RUN_TIME)),
