@@ -603,8 +603,8 @@ def test_each_word_has_its_row_in_the_table() -> None:
     want = {word.encode(): support for support, words in WORDS.items() for word in words.split()}
     assert {word: support for word, (support, _) in TABLE.items()} == want
     feature = (
-        "FEAT TOL CONST DATDEF DATTRG OUTPUT EVAL REFMNT BOUND ASSIGN OBTAIN PROMPT PATH SCNMOD SCNSET SCNPLN "
-        "PAUSE"
+        "FEAT TOL CONST DATDEF DATTRG OUTPUT EVAL REFMNT BOUND ASSIGN OBTAIN PROMPT PATH SCNMOD SCNSET "
+        "SCNPLN PAUSE"
     )
     clear = {*WORDS[Support.UNCHANGED].split()} - {*feature.split()}
     clear |= {"ENDMES", "ELSE", "ELSEIF", "ENDIF", "ENDDO", "ENDMAC"}
