@@ -42,6 +42,8 @@ _KNOWN = {
     "mach4": Known("olp.program.rs274.profiles.mach4"),
     "mazak": Known("olp.program.rs274.profiles.mazak"),
     "centroid": Known("olp.program.rs274.profiles.centroid"),
+    "eding": Known("olp.program.rs274.profiles.eding"),
+    "fagor": Known("olp.program.rs274.profiles.fagor"),
     "okuma": Known("olp.program.rs274.profiles.okuma", signs.OKUMA),
     "siemens-iso": Known("olp.program.rs274.profiles.siemens_iso"),
     "marlin": Known("olp.program.rs274.profiles.marlin", signs.PRINTER),

@@ -209,9 +209,9 @@ def test_a_contradiction_has_its_code() -> None:
 def test_what_each_dialect_of_statements_says_of_itself() -> None:
     apt, dmis = DIALECTS["apt"], DIALECTS["dmis"]
     assert list(DIALECTS) == [
-        "linuxcnc", "fanuc", "grbl", "haas", "mach3", "mach4", "mazak", "centroid", "okuma", "siemens-iso",
-        "marlin", "klipper", "sinumerik", "heidenhain", "apt", "dmis", "list", "fanuc-tp", "urscript",
-        "abb-rapid", "kuka-krl", "yaskawa-inform", "staubli-val3",
+        "linuxcnc", "fanuc", "grbl", "haas", "mach3", "mach4", "mazak", "centroid", "eding", "fagor", "okuma",
+        "siemens-iso", "marlin", "klipper", "sinumerik", "heidenhain", "apt", "dmis", "list", "fanuc-tp",
+        "urscript", "abb-rapid", "kuka-krl", "yaskawa-inform", "staubli-val3",
     ]  # fmt: skip
     assert apt.title == "APT and cutter-location data (ISO 4343, ISO 3592)"
     assert dmis.title == "DMIS part programs of coordinate measuring machines (ISO 22093)"

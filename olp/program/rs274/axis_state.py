@@ -45,7 +45,6 @@ from olp.program.rs274.codes import (
     WRITE_OFFSET,
 )
 from olp.program.rs274.cutter import check_block, check_codes_along, switched_on
-from olp.program.rs274.departures import departure
 from olp.program.rs274.offset_state import EventBlock, OffsetState, Word
 from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.planes import tilted
@@ -372,14 +371,10 @@ class AxisState(OffsetState):
             return (), UNKNOWN
         known = self._moved.get(key := tuple(m_codes))
         if known is None:
-            known = self._moved[key] = self._moved_by(self._moving(m_codes))
+            known = self._moved[key] = self._moved_by(self.moving(m_codes))
         return known
 
-    def departure(self, block: EventBlock) -> tuple[str, str] | None:
-        """What of a block may leave axes at a place that is not known (`departures.departure`)."""
-        return departure(block.g_codes, self._moving(block.m_codes), self.profile.home_m)
-
-    def _moving(self, m_codes: Sequence[int]) -> set[int]:
+    def moving(self, m_codes: Sequence[int]) -> set[int]:
         """Those of M codes, ten times their numbers, that are not known to move no axis."""
         return set(m_codes) - self.profile.still_m - ({SET_TOOL} if self.profile.m61_sets_tool else set())
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence, Set
+from typing import TYPE_CHECKING
 
 from olp.core.errors import ProgramError
 from olp.core.machine import Place
@@ -10,8 +11,14 @@ from olp.program.origin import Origin
 from olp.program.rs274.codes import FIRST_HOME, HOMES, TOOL_CHANGE
 from olp.program.rs274.state import KNOWN_BY
 
-#: Where the axes stand behind these codes, ten times their number, is stated by a key of the machine file.
+if TYPE_CHECKING:
+    from olp.program.rs274.axis_state import AxisState
+    from olp.program.rs274.offset_state import EventBlock
+
+#: A block that moves axes by itself: its line, the axes, where they stand then, and its words.
+Left = tuple[int, Sequence[int], Place, "EventBlock"]
 _NONE: frozenset[int] = frozenset()
+#: Where the axes stand behind these codes, ten times their number, is stated by a key of the machine file.
 _STATED = {FIRST_HOME: "home_mm", 300: "second_home_mm"}
 
 
@@ -33,29 +40,21 @@ def departure(
     return None
 
 
-class Departures:
-    """The blocks of a program that left the axes at a place that is not known."""
+def name(error: ProgramError, left: Iterable[Left], state: AxisState, origin: Origin | None) -> None:
+    """Put into a refusal, and those found with it, which block before its line it follows from.
 
-    def __init__(self, origin: Origin | None) -> None:
-        self._origin = origin
-        self._found: list[tuple[int, str, str]] = []
-
-    def note(self, line: int, axes: Sequence[int], place: Place, found: tuple[str, str] | None) -> None:
-        """Take a block that moves `axes` to a place: if that is not known, and there is a `departure`."""
-        if found is not None and any(place[axis] is None for axis in axes):
-            self._found.append((line, *found))
-
-    def _place(self, line: int) -> str:
-        origin = self._origin
-        return str(line) if origin is None else origin.place(origin.line_of(line))
-
-    def name(self, error: ProgramError) -> None:
-        """Put into a refusal, and those found with it, which block before its line it follows from."""
-        for each in (error, *error.others):
-            before = [found for found in self._found if each.line is None or found[0] <= each.line]
-            if before and KNOWN_BY in each.message:
-                line, name, remedy = before[-1]
-                told = (
-                    f"{name} in line {self._place(line)} may have moved it: {remedy}, or command X, Y and Z"
-                )
-                each.message = each.message.replace(KNOWN_BY, f"{told} behind it")
+    `left` are the blocks that move axes by themselves, in the order of lines. `origin` is that of a text that
+    was unrolled.
+    """
+    found = []
+    for line, axes, place, block in left:
+        if any(place[axis] is None for axis in axes):
+            one = departure(block.g_codes, state.moving(block.m_codes), state.profile.home_m)
+            found += [] if one is None else [(line, *one)]
+    for each in (error, *error.others):
+        before = [one for one in found if each.line is None or one[0] <= each.line]
+        if before and KNOWN_BY in each.message:
+            line, code, remedy = before[-1]
+            there = str(line) if origin is None else origin.place(origin.line_of(line))
+            told = f"{code} in line {there} may have moved it: {remedy}, or command X, Y and Z behind it"
+            each.message = each.message.replace(KNOWN_BY, told)

@@ -8,7 +8,7 @@ change frames (`axis_state`) or need the present position (`special_blocks`) are
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,13 +16,12 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask, any_in_row, is_in
 from olp.core.errors import ProgramError
-from olp.core.machine import UNKNOWN, Setup
+from olp.core.machine import UNKNOWN, Place, Setup
 from olp.core.spool import Text, whole
 from olp.core.toolpath import Flag, Kind
 from olp.core.turns import Turn
 from olp.program.dialect import Options
 from olp.program.directives import Directives, with_payloads
-from olp.program.origin import origin_of
 from olp.program.program import Program
 from olp.program.rs274.axis_state import AxisState, Effect
 from olp.program.rs274.codes import (
@@ -41,7 +40,6 @@ from olp.program.rs274.commands import own_words
 from olp.program.rs274.cycle_blocks import CycleBlocks
 from olp.program.rs274.cycle_runs import CycleWords, Ends, runs
 from olp.program.rs274.cycles import stroke_budget
-from olp.program.rs274.departures import Departures
 from olp.program.rs274.extrusion import Extrusion
 from olp.program.rs274.lexer import WordChunk, chunks
 from olp.program.rs274.modes import Context, Modes, Odd, check_odd, scaled
@@ -92,7 +90,8 @@ class _Reader:
         self.modes = Modes(self.state, block_delete=options.block_delete)
         self.switches = Directives(data)
         self.payloads: dict[int, float] = {}
-        self.departures = Departures(origin_of(data))
+        # the blocks that move axes by themselves (`departures.Left`)
+        self.left: list[tuple[int, Sequence[int], Place, EventBlock]] = []
         self.special_blocks = SpecialBlocks(self.state, self.collector)
         self.cycle_blocks = CycleBlocks(self.state, self.collector, self.switches, stroke_budget(len(data)))
         self.known: KnownBlocks = {}
@@ -128,7 +127,10 @@ class _Reader:
             for chunk in chunks(data, self.state.profile.text, tell=self.options.tell):
                 self._chunk(chunk)
         except ProgramError as error:
-            self.departures.name(error)
+            from olp.program.origin import origin_of
+            from olp.program.rs274.departures import name
+
+            name(error, self.left, self.state, origin_of(self.data))
             raise
         self.modes.check_end()
         return self.collector.program(self.state, self.end_line, self.translation.closings)
@@ -262,7 +264,8 @@ class _Reader:
             if payload or not block.keeps_frame:
                 rows.present = None
             moved, place = state.moved_by(block.m_codes)
-            self.departures.note(number, moved, place, state.departure(block))
+            if moved:
+                self.left.append((number, moved, place, block))
             lost = lost or state.changes_nozzle(block.words)
             if lost:
                 moved, place = (0, 1, 2), state.home_of(block.words)
@@ -299,7 +302,7 @@ class _Reader:
             if here and (alone[upto] or effect.home is not None or effect.machine):
                 self._alone(context, rows, upto, effect)
             if effect.home is not None:
-                self.departures.note(number, effect.home, effect.home_mm, state.departure(block))
+                self.left.append((number, effect.home, effect.home_mm, block))
                 state.forget(effect.home)
                 self.special_blocks.control_move(number, deleted=deleted)
                 if not moved:

@@ -361,9 +361,8 @@ class ProgramState(State):
     def _known(self, letter: str, value: float | None) -> float:
         if value is None:
             raise ProgramError(
-                f"{letter} has no decimal point, so a parameter of the control decides whether it counts "
-                'least increments or whole units; write the point, or state decimal_point = "calculator" in '
-                "the machine file where the control is set so",
+                f"{letter} has no decimal point, so a parameter decides whether it counts least increments "
+                'or whole units; write the point, or state decimal_point = "calculator" in the machine file',
                 code="OLP541",
             )
         return value

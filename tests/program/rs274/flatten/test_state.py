@@ -357,9 +357,8 @@ _BROKEN = (
 )
 _CHANGED = "G90 and G91 change within a series of cycles; give R and the depth again"
 _NO_POINT = (
-    "{} has no decimal point, so a parameter of the control decides whether it counts least increments or "
-    'whole units; write the point, or state decimal_point = "calculator" in the machine file where the '
-    "control is set so"
+    "{} has no decimal point, so a parameter decides whether it counts least increments or whole units; "
+    'write the point, or state decimal_point = "calculator" in the machine file'
 )
 
 
