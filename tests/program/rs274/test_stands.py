@@ -142,6 +142,15 @@ def test_a_refusal_names_the_block_that_left_the_axes(
     assert caught.value.message.endswith(BY_KEY.format(name=name, line=line, do=do))
 
 
+def test_such_a_block_is_named_by_its_line_where_the_program_was_unrolled(tmp_path: Path) -> None:
+    path = machine(tmp_path, SQUARE, controller="linuxcnc", tables=TOOL)
+    text = f"{HEAD}G0 X0 Y0 Z5\no1 sub\n\n\nM81\no1 endsub\no1 call\nG2 X1 Y1 I1 F100\nM2\n"
+    with pytest.raises(ProgramError) as caught:
+        olp.correct(text.encode(), path, flatten=True)
+    assert caught.value.line == 10
+    assert caught.value.message.endswith(BY_KEY.format(name="M81", line=7, do=LIST.format(81)))
+
+
 BUILDERS = "G0 X10. Y10. Z9.\nM81\nG1 X30. F100\nG2 X30. Y30. I0. J10.\nM5 M110\nG1 Z1.\n"
 
 
