@@ -45,6 +45,8 @@ G00 X-4.8259 Y2.9573
 G01 Z0.0000 F800 S30000
 G03 X-5.6483 Y0.3640 Z-0.5000 I4.8259 J-2.9573
 G59.1
+G92 X0 Y-217
+G00 Y0
 G98 G81 X1 Y2 Z-3 R1
 X5
 G80
@@ -96,7 +98,7 @@ REFUSED = {
     ("fagor", "G4 K50"): ("G4 counts by K in a unit that is not known", 3),
     ("eding", "G42 D1 X1"): ("G42 makes corners of contours in a way that is not known", 3),
     ("eding", 'MSG "a" X1'): ("", 3),
-    ("eding", "G92 X0"): ("G92 is not known to the eding profile", 3),
+    ("eding", "G92.1"): ("G92.1 is not known to the eding profile", 3),
     ("eding", "#1 = 5"): ("`#1 = 5` uses parameters, expressions or flow control", 3),
     ("eding", "G81 X1 Y1 Z-1 R1"): ("whether this cycle returns to its initial level or to R", 3),
 }

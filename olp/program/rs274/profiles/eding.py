@@ -18,7 +18,7 @@ from olp.program.rs274.profiles.base import ISO_M, M_REFUSALS, REFUSALS, Act, g_
 from olp.program.rs274.profiles.mach3 import DIALECT as MACH3
 
 #: None of the codes that its posts write.
-_UNWRITTEN = frozenset({100, 382, 383, 384, 385, 520, 730, 740, 840, 901, 911, 920, 930, 960, 970})
+_UNWRITTEN = frozenset({100, 382, 383, 384, 385, 520, 730, 740, 840, 901, 911, 930, 960, 970})
 _CONTOURS = {
     code: f"G{code // 10} makes corners of contours in a way that is not known; post the path of the tool "
     "without compensation"
