@@ -131,7 +131,7 @@ def arm_path(
     wanted = Wanted(
         flange, joints, values, fits, straight, used.mask("free"),
         np.isnan(config).any(axis=1) | (config.shape[1] == 0), begins, np.where(begins, before, 0),
-        _stood(targets, rows, arm), used.mask("led"), used.line,
+        _known_at(targets, rows, arm), used.mask("led"), used.line,
     )  # fmt: skip
     wordless = np.array([not words for words in used.of("config")], bool)
     width, none_held = len(structure.order), np.array([places[(0.0, 0.0, 0.0)]])
@@ -191,11 +191,11 @@ def _refuse_turns(arm: Arm, start: Array, end: Array, straight: Mask, line: Inde
         )
 
 
-def _stood(targets: Targets, rows: Index, arm: Arm) -> Array:
+def _known_at(targets: Targets, rows: Index, arm: Arm) -> Array:
     """(n, 6) axis values to which the moves before `rows` go as written; NaN where none are known."""
     values = np.full((len(rows), AXES), np.nan)
     for row, move in enumerate(rows.tolist()):
-        own = targets.stood.get(move - 1)
+        own = targets.known_at.get(move - 1)
         if own is not None:
             values[row, arm.columns] = own
     return values

@@ -31,8 +31,8 @@ class Wanted:
     NaN. `values` and `fits` are the postures that their words name (`RobotDialect.fitting`). Moves go
     `straight`, or with any posture near by where they are `free`; `open` ones do not name one posture.
     `begins` are moves whose start is not known, and `behind` is the line of the move that leaves it open:
-    their own where the run decides it. `stood` (n, 6) are axis values before a move whose start is not known,
-    NaN where they are not, too; those that are `led` go straight from there. `line` is that of the move."""
+    their own where the run decides it. `known_at` (n, 6) are axis values from which such a move begins
+    all the same, NaN where none are known; those that are `led` go straight from there. `line` is that of the move."""
 
     flange: Poses
     joints: Array
@@ -43,7 +43,7 @@ class Wanted:
     open: Mask
     begins: Mask
     behind: Index
-    stood: Array
+    known_at: Array
     led: Mask
     line: Index
 
@@ -81,7 +81,7 @@ class Settled:
         k = 0
         while k < len(values):
             if begins[k]:
-                last, which, lost = wanted.stood[k], -1, False
+                last, which, lost = wanted.known_at[k], -1, False
             numbers = self._on(k, which, begins)
             if numbers:
                 behind = k + len(numbers)
@@ -223,8 +223,8 @@ class Settled:
         if behind not in (0, line) and (self.wanted.open[k] or (not found and self.wanted.free[k])):
             raise _refused(
                 "the target is reached from the posture before it, and where the move of line "
-                f"{behind} goes is not read; state the configuration, the numbers of that move, or where "
-                "it goes in joint_targets of the job",
+                f"{behind} goes is not read; state the configuration, the numbers of that move, or "
+                "joint_targets",
                 line,
             )
         if self.wanted.open[k]:

@@ -95,7 +95,7 @@ class RobotMoves:
         self.uses: list[Use | None] = []
         self.arcs: list[Arc] = []
         self.gaps: list[int] = []
-        self._stood: dict[int, tuple[float, ...]] = {}
+        self._known_at: dict[int, tuple[float, ...]] = {}
         #: why moves are left as they are written, and names whose numbers something else needs, in capitals
         self._left: list[DecidedInRun] = []
         self._held: set[str] = set()
@@ -229,7 +229,7 @@ class RobotMoves:
     ) -> None:
         """Add an arc as its via point and its end, as its path is not known."""
         # along an arc the posture stays, and which one that is the way would say
-        self._stood.pop(self.count - 1, None)
+        self._known_at.pop(self.count - 1, None)
         self.remark(f"points: {why}", line, f"{why}: it is corrected at its via point and at its end")
         for use in uses:
             self.move(line, use, frame, tool, feed, straight=False, whole=True)
@@ -319,7 +319,7 @@ class RobotMoves:
             return
         self.known, self._turn, self._rest = True, None, ()
         if stands:
-            self._stood[self.count] = stands
+            self._known_at[self.count] = stands
         self._open(line, self._flange(line))
 
     def decided(self, error: DecidedInRun) -> None:
@@ -396,7 +396,7 @@ class RobotMoves:
                 else target
                 for target in own
             ]
-        targets = Targets(tuple(own), tuple(self.uses), tuple(self.arcs), tuple(self.gaps), self._stood)
+        targets = Targets(tuple(own), tuple(self.uses), tuple(self.arcs), tuple(self.gaps), self._known_at)
         return replace(program, targets=targets)
 
 

@@ -124,14 +124,14 @@ class Arc:
 class Targets:
     """All targets of a program, and (n,) what each of its moves uses; None for a move that the text does not
     state as a target. `arcs` are those among the moves, in their order, and `gaps` the moves that no
-    statement makes: before the next one the machine may have gone anywhere. `stood` are moves that are left
-    as written, with the joint values to which they go, in degrees."""
+    statement makes: before the next one the machine may have gone anywhere. `known_at` are moves that
+    are left as written, with the joint values to which they go, in degrees."""
 
     targets: tuple[Target, ...]
     uses: tuple[Use | None, ...]
     arcs: tuple[Arc, ...] = ()
     gaps: tuple[int, ...] = ()
-    stood: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
+    known_at: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
