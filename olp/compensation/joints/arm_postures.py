@@ -32,7 +32,8 @@ class Wanted:
     `straight`, or with any posture near by where they are `free`; `open` ones do not name one posture.
     `begins` are moves whose start is not known, and `behind` is the line of the move that leaves it open:
     their own where the run decides it. `known_at` (n, 6) are axis values from which such a move begins
-    all the same, NaN where none are known; those that are `led` go straight from there. `line` is that of the move."""
+    all the same, NaN where none are known; those that are `led` go straight from there. `line` is that of
+    the move."""
 
     flange: Poses
     joints: Array
