@@ -143,6 +143,7 @@ REFUSED = {
     f"$TOOL={P}\n$BASE={P}\nLIN {P} WITH $IPO_MODE=#TCP": "may stand still",
     "RSI_MOVECORR()": "sensor",
     f"FDAT_ACT=f\nBAS(#PTP_PARAMS,10)\n$TOOL={P}\n$BASE={P}\nLIN {P}": "may stand still",
+    f"FDAT_ACT=none\nBAS(#PTP_PARAMS,10)\nLIN {P}": "line 3 sets those of a taught point",
     "what is this": "not a statement of KRL",
 }  # fmt: skip
 

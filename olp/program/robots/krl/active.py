@@ -163,6 +163,9 @@ class Active:
         if command in (b"PTP_PARAMS", b"CP_PARAMS", b"FRAMES"):
             for which in ("BASE", "TOOL"):
                 self._set(which, self._of_taught(which, self._taught), line)
+            if self.state.base is None or self.state.tool is None:
+                why = f"line {line.line} sets those of a taught point that the text does not state"
+                self.state = replace(self.state, why=why)
             still = self._any_still if self._taught is None else self._taught.fixed
             self.state = replace(self.state, still=still)
             if command == b"CP_PARAMS":
