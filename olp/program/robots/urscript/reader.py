@@ -337,7 +337,8 @@ class _Reader:
                 raise self._computed(line, text)
             frame = located
             begin, text = begin + stated.start(1) + parts[1].start(), parts[1][0]
-        place, added, offsets = _within(begin, text), Pose(), ()
+        place, added = _within(begin, text), Pose()
+        offsets: tuple[Span, ...] = ()
         sum_ = _ADDED.fullmatch(text)
         if sum_ is not None:
             parts = list(_ARGUMENT.finditer(sum_[1]))
