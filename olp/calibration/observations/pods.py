@@ -7,7 +7,9 @@ points and are iterated by Gauss-Newton.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -16,7 +18,9 @@ import numpy as np
 from olp.calibration.estimator.normal import Block, Chunk, residuals_of
 from olp.calibration.estimator.parameters import Unknowns
 from olp.calibration.observations.base import (
+    OWN_SCALE,
     Advance,
+    Alternative,
     Noise,
     Outlier,
     Scattered,
@@ -92,6 +96,14 @@ class Pods(Scattered):
     def count(self) -> int:
         """How many pods."""
         return int(self.azimuth_rad.shape[1])
+
+    def alternatives(self) -> Sequence[Alternative]:
+        """Baselines of another length. Angles counted otherwise are refused with their convention."""
+        if not self.baselines:
+            return ()
+        loose = [(i, j, apart, math.hypot(sigma, OWN_SCALE * apart)) for i, j, apart, sigma in self.baselines]
+        words = "a baseline between its pods has another length than stated, or temperature changed it"
+        return [Alternative("scale", words, replace(self, baselines=tuple(loose)), where_off=True)]
 
     def start(self, noise: Noise | None = None) -> PodsState:
         return PodsState(self, first_poses(self))

@@ -31,6 +31,7 @@ MORE = (
     ("place", "exx.csv", "points"),
     ("lever", "points.csv", "points"),
     ("scale", "station-0.csv", "stations"),
+    ("scale", "pods.csv", "pods"),
 )
 
 
