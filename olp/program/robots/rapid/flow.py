@@ -48,7 +48,8 @@ _FOUND = pattern(rb"\A[^,]*(?:,\s*\\[^,]*)*,\s*([A-Za-z]\w*)")
 _WHOLE = pattern(rb"(?s)\s*[A-Za-z]\w*\s*:=\s*(.*?)\s*")
 _AREA = pattern(rb"(?i)\s*SingArea\b[^\\]*\\\s*(Wrist|LockAxis4)")
 _ARC_MODE = pattern(rb"(?i)\s*CirPathMode\b[^\\]*\\\s*(CirPointOri|Wrist\w*)")
-_OPENING, _CLOSING = b"()"
+_OPENING = ord("(")
+_CLOSING = ord(")")
 #: The word of a short IF.
 IF = b"IF"
 #: What a short IF must not hold.
