@@ -121,12 +121,12 @@ def _across(model: ErrorModel, start: Array, delta: Array, tool: Array, steps: i
     samples = steps + 1
     share = np.arange(samples) / steps
     shape = len(delta), samples
-    point = np.empty((*shape, 3))
+    path = np.empty((*shape, 3))
     for axis in range(3):
         column = delta[:, axis, None] * share
         column += start[:, axis, None]
-        point[..., axis] = column
-    point = point.reshape(-1, 3)
+        path[..., axis] = column
+    point = path.reshape(-1, 3)
     tools = tool if tool.ndim == 1 else np.repeat(tool, samples, axis=0)
     play = None
     if model.backlash_at(point[:1]) is not None:
@@ -209,7 +209,7 @@ def _fits(
     for a in range(0, len(sample), _CHORDS):
         some = slice(a, a + _CHORDS)
         # from each of equal parts the one in its middle; one that is looked at twice changes nothing
-        nth = _MIDDLES * step[some]
+        nth: Array = _MIDDLES * step[some]
         nth += before[some]
         np.floor(nth, out=nth)
         np.minimum(nth, last[some], out=nth)
