@@ -209,7 +209,7 @@ def _fits(
     for a in range(0, len(sample), _CHORDS):
         some = slice(a, a + _CHORDS)
         # from each of equal parts the one in its middle; one that is looked at twice changes nothing
-        nth: Array = _MIDDLES * step[some]
+        nth = np.asarray(_MIDDLES * step[some], float)
         nth += before[some]
         np.floor(nth, out=nth)
         np.minimum(nth, last[some], out=nth)

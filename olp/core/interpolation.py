@@ -115,8 +115,8 @@ class Interpolant:
 @dataclass(frozen=True, slots=True, eq=False)
 class DenseTable:
     """Piecewise linear columns on fine nodes. `constant` has the number of each column that is the same
-    everywhere, and None of those that vary: (v, count) `value` are theirs at the nodes, and `rise` is how
-    much they rise over the cells.
+    everywhere, and None of those that vary. Of these (v, count) `value` holds the values at the nodes, and
+    `rise` how much they rise over the cells.
 
     `nodes` is None for a uniform grid from `low` with `step`. Else it holds the nodes, `rise` is the slope,
     and `step` is the widest cell. Then `guide` gives the cell at the start of each of many equal bins, none
