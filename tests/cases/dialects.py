@@ -9,13 +9,14 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from judge import inform
 
 from olp.program import registry
 from olp.program.rs274.profiles.base import Act, Profile
+from olp.program.rs274.profiles.fagor import DIALECT as FAGOR
 
 NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)"
 Lines = list[str]
@@ -124,6 +125,10 @@ RS274 = {name: d for name, d in registry.DIALECTS.items() if isinstance(d, Profi
 BLOCKS = (*RS274, "sinumerik")
 CASES = {
     **{name: _rs274(name, profile) for name, profile in RS274.items()},
+    "fagor": replace(
+        _rs274("fagor", FAGOR), head=["G71 G90 G17 G54 G94 F600"],
+        examples=(b"T1.1 M6\nG43 Z5\nG44\n", b"T1\n", b"(T1.2) T1.2\n", b"G54 X1\n", b"%\n%\n"),
+    ),
     "sinumerik": Case(
         "sinumerik", "sinumerik", "GXYZIJKRFMTNSPDACL%_/;()[]$=+-.,\" 0123456789\r\n\t:<>*",
         ["%_N_TEST_MPF", ";$PATH=/_N_MPF_DIR", "G71 G90 G17 G54 G94 F600"], ["M30"],

@@ -11,6 +11,7 @@ from judge.arm import Arm
 from judge.arm_files import MACHINE
 
 from olp.compensation.joints.arm_postures import Settled, Wanted, nearest
+from olp.core.arrays import Array
 from olp.files.kinematics.load import load_joint_machine
 from olp.kinematics.parallel_arm import arm_of
 from olp.kinematics.poses import Poses
@@ -18,6 +19,11 @@ from olp.program.robots.inform import postures as inform
 from olp.program.robots.krl import postures as krl
 from olp.program.robots.ls import postures as ls
 from olp.program.robots.rapid import postures as rapid
+
+
+def nowhere(target: int, axes: Array) -> Poses:
+    """No move here begins where only the axes are known."""
+    raise AssertionError(target, axes)
 
 
 def test_a_series_of_straight_moves_goes_on_near_by() -> None:
@@ -33,9 +39,9 @@ def test_a_series_of_straight_moves_goes_on_near_by() -> None:
         yes, no = np.ones(count, bool), np.zeros(count, bool)
         wanted = Wanted(
             flange, np.full((count, 6), np.nan), postures, np.isfinite(postures[:, :, 0]), yes, no, no, no,
-            np.zeros(count, np.int64), np.arange(1, count + 1),
+            np.zeros(count, np.int64), np.full((count, 6), np.nan), no, np.arange(1, count + 1),
         )  # fmt: skip
-        found = Settled(arm, wanted, postures, np.array([[-400.0] * 6, [400.0] * 6])).axes(middle)
+        found = Settled(arm, wanted, postures, np.array([[-400.0] * 6, [400.0] * 6]), nowhere).axes(middle)
         last = middle
         for k in range(count):
             last = nearest(last[None], postures[k][None])[0]
@@ -54,9 +60,9 @@ def test_a_target_without_words_is_reached_near_by_where_other_postures_are_none
     assert 0 < there.sum() < 8
     wanted = Wanted(
         flange, np.full((1, 6), np.nan), postures, there, no, no, yes, no, np.zeros(1, np.int64),
-        np.ones(1, np.int64),
+        np.full((1, 6), np.nan), no, np.ones(1, np.int64),
     )  # fmt: skip
-    found = Settled(arm, wanted, postures, np.array([[-400.0] * 6, [400.0] * 6])).axes(goal + 1.0)
+    found = Settled(arm, wanted, postures, np.array([[-400.0] * 6, [400.0] * 6]), nowhere).axes(goal + 1.0)
     assert np.abs(found[0] - goal).max() < 1e-7
 
 

@@ -140,7 +140,7 @@ def test_more_points_and_better_ones_are_never_worse() -> None:
 
 
 #: controls whose G53 is another code, or an option of the firmware
-WITHOUT_MACHINE_POSITIONS = ("okuma", "marlin", "klipper")
+WITHOUT_MACHINE_POSITIONS = ("okuma", "marlin", "klipper", "fagor")
 
 
 @pytest.mark.parametrize("control", sorted(name for name, d in DIALECTS.items() if isinstance(d, Profile)))

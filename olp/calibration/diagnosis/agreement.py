@@ -39,6 +39,8 @@ NAMED = math.log(_TRIED / _BY_CHANCE)
 _CONFIRMED = math.log(20.0)
 #: Such a cause explains at least this share of what a source contradicts, by the evidence.
 _EXPLAINS = 0.9
+#: Nats by which others confirm one reading at most: what its curve may be over its noise is below e^10.
+_PER_READING = 10.0
 #: Nats by which something is excluded: 100 to 1.
 EXCLUDED = math.log(100.0)
 #: Curves of two sizes for which evidence is taken differ by this factor at most.
@@ -249,7 +251,13 @@ def _worst(now: tuple[Agreement, ...], left: set[int]) -> tuple[int, Tried | Non
     against = [now[k].against if k in left and now[k].contradicts else -np.inf for k in range(len(now))]
     named = {k: found for k in left if (found := now[k].named) is not None}
     most = max(against)
-    best = max(named, key=lambda k: named[k].log_odds, default=-1)
+
+    def explained(k: int) -> float:
+        """How much the cause explains, as far as it can: what others tell of a sound source where they follow
+        a wrong one is no more than absurd."""
+        return min(named[k].log_odds, now[k].against + _PER_READING * now[k].misfit.freedom)
+
+    best = max(named, key=explained, default=-1)
     if best >= 0 and named[best].log_odds > _EXPLAINS * most:
         return best, named[best]
     return (int(np.argmax(against)), None) if np.isfinite(most) else (-1, None)

@@ -17,6 +17,7 @@ from olp.calibration.estimator.normal import Block, Chunk, residuals_of
 from olp.calibration.estimator.parameters import Unknowns, frame_columns
 from olp.calibration.observations.base import (
     Advance,
+    Alternative,
     Noise,
     Outlier,
     Scattered,
@@ -92,6 +93,17 @@ class Artefact(Scattered):
         for name, column in columns.items():
             column.flags.writeable = False
             object.__setattr__(self, name, column)
+
+    def alternatives(self) -> Sequence[Alternative]:
+        """Balls counted from the other end, swapped columns, and a certificate that is not theirs."""
+        last = len(self.certificate_mm) - 1
+        other = replace(self, ball=last - self.ball)
+        found = [Alternative("order", "its balls are counted from the other end", other), *self.swapped()]
+        if self.sigma_ball_mm.any() and len(np.unique(self.pose)) > 1:
+            drawn = replace(self, sigma_ball_mm=np.zeros(len(self.certificate_mm)))
+            words = "its certificate is that of another artefact, or temperature changed its length"
+            found.append(Alternative("scale", words, drawn, where_off=True))
+        return found
 
     def start(self, noise: Noise | None = None) -> ArtefactState:
         return ArtefactState(self, self.certificate_mm)

@@ -51,7 +51,7 @@ ARCSEC_URAD = math.pi / 0.648
 #: Standard deviation of a place or lever arm that may be another one, mm.
 OWN_LEVER_MM = 500.0
 #: By how much axes at rest tilt a line at another place, as a standard deviation, rad.
-_OWN_TILT = 5e-5
+_OWN_TILT = 2e-5
 _DOUBLE = (
     ("factor 2", 2.0, "its values are half of what they should be"),
     ("factor 2", 0.5, "its values are twice what they should be"),

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from cases.calibration import case, cloud, rays, residual_of
 from cases.fast import some_of_a_campaign
+from judge import simulated
 from judge.simulated import OFFSETS
 
 from olp.calibration.diagnosis.agreement import Agreement, Compared, Tried, compared
 from olp.calibration.diagnosis.agreement_report import agreement_findings, agreement_rows
 from olp.calibration.estimator.adjustment import fit
+from olp.calibration.observations.artefact import Artefact
 from olp.calibration.observations.lines import Line
 from olp.calibration.observations.measurements import Measurements
 from olp.core.errors import ConfigError
@@ -115,6 +117,54 @@ def test_what_nothing_else_measures_is_said_to_be_unchecked() -> None:
     q = np.linspace(low, high, 5)
     most = 2000.0 * np.abs(fitted.curve("EXX", q) @ fitted.theta).max()
     assert rows["exx.csv"]["hidden_harm_um"] > 0.99 * most
+
+
+def plate(machine: simulated.Machine, wrong: str) -> Artefact:
+    """Twelve balls 0.12 mm off a grid of 390 x 310 mm, touched in four poses with one tool."""
+    rng = np.random.default_rng(1)
+    balls = np.array([(x, y, 0.0) for x in (0.0, 130.0, 260.0, 390.0) for y in (0.0, 150.0, 310.0)])
+    longer = 1.0 + 9e-5 * (wrong == "certificate")
+    low, size = machine.box[:, 0], np.ptp(machine.box, axis=1)
+    tool = np.array((0.0, 0.0, -120.0))
+    stops = []
+    lying = (0, (0.2, 0.2, 0.3)), (1, (0.7, 0.3, 0.5)), (2, (0.7, 0.8, 0.7)), (0, (0.4, 0.5, 0.2))
+    for quarter, share in lying:
+        c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))[quarter]
+        wanted = longer * balls @ np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0))) + low + size * share
+        stop = wanted
+        for _ in range(6):
+            stop = wanted - machine.error(stop, np.broadcast_to(tool, stop.shape))
+        stops.append(stop + rng.normal(0.0, 1e-3, stop.shape))
+    axis_mm = np.concatenate(stops)
+    ball = np.tile(np.arange(len(balls)), len(stops))
+    return Artefact(
+        axis_mm[:, [1, 0, 2]] if wrong == "columns" else axis_mm, tool,
+        len(balls) - 1 - ball if wrong == "numbers" else ball, np.repeat(np.arange(4), len(balls)), balls,
+        np.full(len(balls), 5e-4), 1e-3, "plate.csv",
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    some_of_a_campaign(
+        [
+            ("numbers", "counted from the other end"),
+            ("certificate", "certificate is that of another artefact"),
+            ("columns", "X and Y of its axis positions are swapped"),
+            ("", ""),
+        ],
+        4,
+    ),
+)
+def test_a_mistake_of_an_artefact_is_named(wrong: str, words: str) -> None:
+    machine, taken = case(106, "smooth")
+    whole = dataclasses.replace(taken, observations=(*taken.lines, plate(machine, wrong)))
+    outcome = compared(fit(whole, machine.chain))
+    named = [(one.label, one.named.words) for one in outcome.wrong if one.named is not None]
+    assert not outcome.unlike
+    assert len(named) == (wrong != "")
+    assert all(label == "plate.csv" and words in said for label, said in named)
 
 
 def test_a_cause_that_is_not_sought_is_listed_and_never_named() -> None:

@@ -23,6 +23,7 @@ from olp.workflows.flatten import UnrollOptions, as_asked
 LINUXCNC, FANUC, HAAS, GRBL = CONTROLS = ("linuxcnc", "fanuc", "haas", "grbl")
 MACH3, MACH4, MAZAK, OKUMA, SIEMENS = FURTHER = ("mach3", "mach4", "mazak", "okuma", "siemens-iso")
 CENTROID = "centroid"
+EDING = "eding"
 MARLIN, KLIPPER = PRINTERS = ("marlin", "klipper")
 #: Each tool has a length along X, too.
 TOOLS = "".join(
@@ -707,12 +708,13 @@ def test_how_programs_of_a_control_are_written() -> None:
         SIEMENS: ("nc", 4, 0, False, 0.0, True),
         MARLIN: ("gcode", 5, 1, False, 0.0, False),
         KLIPPER: ("gcode", 5, 1, False, 0.0, False),
+        EDING: ("cnc", 5, 1, False, 0.0, False),
     }
     for profile in PROFILES:
         assert profile.title.startswith({GRBL: "Grbl 1.1 and", HAAS: "Haas mills"}.get(profile.name, ""))
         assert profile.first == (b"%", b"O|:") or profile.commands is not None
         assert profile.payload_comments
-        assert (profile.unroller is None) == (profile.name in (*PRINTERS, CENTROID))
+        assert (profile.unroller is None) == (profile.name in (*PRINTERS, CENTROID, EDING))
         # outputs that are switched along with a motion
         along = frozenset({62, 63, 67}) if profile.name == LINUXCNC else frozenset()
         assert profile.m_with_motion == along or {104, 106, 204} < profile.m_with_motion

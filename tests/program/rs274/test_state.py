@@ -13,6 +13,8 @@ from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.state import State
 from olp.program.rs274.strokes import CODES
 
+#: Controls on which a setting says to which height a cycle returns.
+RETRACT_SET = ("mach3", "mach4", "okuma", "marlin", "klipper", "eding", "fagor")
 PROFILES = [d for d in registry.DIALECTS.values() if isinstance(d, Profile)]
 ACTS = {
     Act.PLANE: "plane",
@@ -150,7 +152,7 @@ def test_what_is_in_force_at_the_start() -> None:
         state = State(profile)
         assert (state.plane, state.distance, state.arc_distance, state.feed_mode) == (170, 900, 911, 940)
         # a setting of the control where it is -1
-        assert state.retract in (980, 990) or profile.name in ("mach3", "mach4", "okuma", "marlin", "klipper")
+        assert state.retract in (980, 990) or profile.name in RETRACT_SET
         assert (state.motion, state.unit, state.unit_mm) == (None, None, 1.0)
         assert state.retract_to_r == (profile.name in ("linuxcnc", "grbl"))
         assert len(state.position) == 3
