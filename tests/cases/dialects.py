@@ -122,7 +122,7 @@ def _rs274(name: str, profile: Profile) -> Case:
 #: A control of this family whose texts are words alone needs no case of its own.
 RS274 = {name: d for name, d in registry.DIALECTS.items() if isinstance(d, Profile) and d.translator is None}
 #: Dialects whose words may be omitted.
-BLOCKS = (*RS274, "sinumerik")
+BLOCKS = (*RS274, "fagor", "sinumerik")
 CASES = {
     **{name: _rs274(name, profile) for name, profile in RS274.items()},
     "fagor": replace(

@@ -284,11 +284,14 @@ def test_l6_distances_do_not_drift(bent: dict[str, Path], name: str) -> None:
 def test_l5_l7_linuxcnc_makes_the_moves_and_the_arcs(tmp_path: Path, name: str) -> None:
     """What all controls of this family have in common is in words of LinuxCNC too."""
     case, profile = CASES[name], RS274[name]
-    head = [*case.head, "G91.1"] if profile.arc_distance is None else case.head
+    centres_open, coded = profile.arc_distance is None, 911 in profile.codes
+    head = [*case.head, "G91.1"] if centres_open and coded else case.head
     arcs = ["G3 X0.000 Y10.000 I-10.000 J0.000", "G2 X-20.000 Y10.000 I-10.000 J0.000"]
     rows = [case.point((10.0, 0.0, 1.0), 3), *arcs, case.point((-40.0, 30.0, -3.5), 3)]
     nominal = "\n".join([*head, *rows, *case.tail, ""]).encode()
     path = machines.random_machine(tmp_path, 11, Recipe(controller=case.controller, off_datum=True))
+    if centres_open and not coded:
+        path.write_text('arc_centres = "incremental"\n' + path.read_text())
     meant = np.array([(10, 0, 1), (0, 10, 1), (-20, 10, 1), (-40, 30, -3.5)]) + OFFSET
     # for LinuxCNC the G0 with a feed alone at the head of printers is a move to where it stands
     np.testing.assert_allclose(linuxcnc.interpret(nominal, tmp_path).axis[-4:], meant, atol=1e-9)
