@@ -67,10 +67,10 @@ def cutting_moves(path: Toolpath) -> Mask:
 
 def measure(
     nominal: Toolpath, target_mm: TargetRows, path: Toolpath, groups: Index, counted: Mask, model: ErrorModel,
-    bend_mm: float, tell: Progress = silent, *, strokes: bool = True,
+    bend_mm: float, tell: Progress = silent, *, elsewhere: Mask | None = None,
 ) -> Deviation:  # fmt: skip
-    """Compare the actual path of `path` with the nominal one. Without `strokes` those of canned cycles are
-    compared where the moves end that they became, and not between.
+    """Compare the actual path of `path` with the nominal one. Nominal moves (n,) that something else judges
+    `elsewhere` along their way are compared where the moves end that they became, and not between.
 
     `target_mm` (n, 3) are the nominal waypoints where the part really lies; `groups` (n,) is the index of
     the last move of `path` that belongs to each nominal move. (n,) `counted` are those whose chords count.
@@ -78,7 +78,7 @@ def measure(
     count = len(nominal)
     waypoint, worst = (apart((count,), np.float32) for _ in range(2))
     largest = 0.0
-    tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm, strokes=strokes)
+    tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm, elsewhere)
     starts = UnknownStarts(nominal, target_mm, path, groups, model, bend_mm)
     sides = UnknownSides(path, model) if tracer.has_play else None
     # without play one 0 stands for all
@@ -112,11 +112,10 @@ class Tracer:
         groups: Index,
         model: ErrorModel,
         bend: float,
-        *,
-        strokes: bool = True,
+        elsewhere: Mask | None = None,
     ) -> None:
         self.nominal, self.target, self.path, self.groups = nominal, target, path, groups
-        self.model, self.bend, self.strokes = model, bend, strokes
+        self.model, self.bend, self.elsewhere = model, bend, elsewhere
         #: the play, and the least and the greatest that are possible
         self.play: Array | None = None
         self.between: Array | None = None
@@ -211,8 +210,8 @@ class Tracer:
         known = np.asarray(all_in_row(np.isfinite(delta)))
         arc = _arc_index(path, first, last)
         cut = known & (path.kind[first:last] != Kind.RAPID)
-        if not self.strokes:
-            cut &= ((self.nominal.flag[a:b] & np.uint8(Flag.CYCLE)) == 0)[owner]
+        if self.elsewhere is not None:
+            cut &= ~self.elsewhere[a:b][owner]
         which = longer(delta, self.clear_mm)
         which = which[cut[which]]
         if which.size:

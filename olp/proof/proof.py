@@ -204,10 +204,8 @@ def prove(
 
     def side(program: Program, ends: Index, told: Progress) -> _Measured:
         bottom, stroke = strokes_mm(nominal, target, program.toolpath, program.holes, model, bend)
-        by_hole = len(bottom) > 0
-        deviation = measure(
-            path, target, program.toolpath, ends, feed, model, bend, told, strokes=not by_hole
-        )
+        by_hole = nominal.holes.inside(len(path)) if len(bottom) else None
+        deviation = measure(path, target, program.toolpath, ends, feed, model, bend, told, elsewhere=by_hole)
         size = _sizes(deviation, how, bottom, stroke)
         for some in spans(len(size)):
             size[some][counts[some] > Counts.LEFT] = np.nan

@@ -94,16 +94,18 @@ def test_the_end_the_path_and_the_bend_of_a_line() -> None:
     assert {part.dtype for part in (got.waypoint, got.path)} == {np.dtype(np.float32)}
 
 
-def test_strokes_of_cycles_that_are_compared_apart_have_no_samples_here() -> None:
-    """A split stroke, and a feed move of the same program behind it, half a wave each."""
-    path = toolpath(rapid(0, 0, 0), line(0, 0, -50, flag=CYCLE), rapid(0, 0, 0, flag=CYCLE), line(0, 0, -50))
-    # the flag of the nominal move counts
+def test_strokes_that_are_compared_elsewhere_have_no_samples_here() -> None:
+    """A split stroke, and one of the same program behind it that is compared here, half a wave each."""
+    path = toolpath(
+        rapid(0, 0, 0), line(0, 0, -50, flag=CYCLE), rapid(0, 0, 0, flag=CYCLE), line(0, 0, -50, flag=CYCLE)
+    )
+    elsewhere = np.array([False, True, True, False])
     moves = rapid(0, 0, 0), line(0, 0, -9), line(0, 0, -50), rapid(0, 0, 0), line(0, 0, -50)
     groups, counted = np.array([0, 2, 3, 4]), np.ones(4, bool)
     model, other = wave(1, 2, 0.01, 100.0), toolpath(*moves)
     with_them, without = (
-        measure(path, path.end_mm, other, groups, counted, model, BEND_MM, strokes=own)
-        for own in (True, False)
+        measure(path, path.end_mm, other, groups, counted, model, BEND_MM, elsewhere=own)
+        for own in (None, elsewhere)
     )
     assert with_them.path == pytest.approx([0.0, 0.01, 0.0, 0.01], abs=1e-4)
     # of the stroke only the ends of its parts count
