@@ -49,6 +49,7 @@ from olp.program.rs274.offset_state import EventBlock, OffsetState, Word
 from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.planes import tilted
 from olp.program.rs274.profiles.base import Profile
+from olp.program.rs274.profiles.words import moving_m
 from olp.program.rs274.state import NAN, PathMode
 from olp.program.rs274.turned import Along
 from olp.program.tilts import Tilt
@@ -371,12 +372,8 @@ class AxisState(OffsetState):
             return (), UNKNOWN
         known = self._moved.get(key := tuple(m_codes))
         if known is None:
-            known = self._moved[key] = self._moved_by(self.moving(m_codes))
+            known = self._moved[key] = self._moved_by(moving_m(self.profile, m_codes))
         return known
-
-    def moving(self, m_codes: Sequence[int]) -> set[int]:
-        """Those of M codes, ten times their numbers, that are not known to move no axis."""
-        return set(m_codes) - self.profile.still_m - ({SET_TOOL} if self.profile.m61_sets_tool else set())
 
     def _moved_by(self, moving: set[int]) -> tuple[tuple[int, ...], Place]:
         """The axes that such codes may move, and where these stand then."""

@@ -9,11 +9,12 @@ from olp.core.errors import ProgramError
 from olp.core.machine import Place
 from olp.program.origin import Origin
 from olp.program.rs274.codes import FIRST_HOME, HOMES, TOOL_CHANGE
+from olp.program.rs274.profiles.words import moving_m
 from olp.program.rs274.state import KNOWN_BY
 
 if TYPE_CHECKING:
-    from olp.program.rs274.axis_state import AxisState
     from olp.program.rs274.offset_state import EventBlock
+    from olp.program.rs274.profiles.base import Profile
 
 #: A block that moves axes by itself: its line, the axes, where they stand then, and its words.
 Left = tuple[int, Sequence[int], Place, "EventBlock"]
@@ -40,7 +41,7 @@ def departure(
     return None
 
 
-def name(error: ProgramError, left: Iterable[Left], state: AxisState, origin: Origin | None) -> None:
+def name(error: ProgramError, left: Iterable[Left], profile: Profile, origin: Origin | None) -> None:
     """Put into a refusal, and those found with it, which block before its line it follows from.
 
     `left` are the blocks that move axes by themselves, in the order of lines. `origin` is that of a text that
@@ -49,7 +50,7 @@ def name(error: ProgramError, left: Iterable[Left], state: AxisState, origin: Or
     found = []
     for line, axes, place, block in left:
         if any(place[axis] is None for axis in axes):
-            one = departure(block.g_codes, state.moving(block.m_codes), state.profile.home_m)
+            one = departure(block.g_codes, moving_m(profile, block.m_codes), profile.home_m)
             found += [] if one is None else [(line, *one)]
     for each in (error, *error.others):
         before = [one for one in found if each.line is None or one[0] <= each.line]

@@ -130,7 +130,7 @@ class _Reader:
             from olp.program.origin import origin_of
             from olp.program.rs274.departures import name
 
-            name(error, self.left, self.state, origin_of(self.data))
+            name(error, self.left, self.state.profile, origin_of(self.data))
             raise
         self.modes.check_end()
         return self.collector.program(self.state, self.end_line, self.translation.closings)

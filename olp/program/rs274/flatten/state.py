@@ -30,7 +30,6 @@ from olp.program.rs274.codes import (
     PATH_MODES,
     PRESET,
     PROBES,
-    SET_TOOL,
     SHIFTS,
     SPLINES,
     TABLE_LENGTHS,
@@ -53,6 +52,7 @@ from olp.program.rs274.flatten.language import Language
 from olp.program.rs274.flatten.lines import Word
 from olp.program.rs274.flatten.start import Start
 from olp.program.rs274.profiles.base import Act, Profile
+from olp.program.rs274.profiles.words import moving_m
 from olp.program.rs274.state import BROKEN_SERIES, NAN, OPEN_RETRACT, TURNED_SERIES, State
 
 #: A word with its value; None is a value whose unit is not known (`Language.increments_open`).
@@ -202,7 +202,7 @@ class ProgramState(State):
     def _forget_moved(self, code: int) -> None:
         """The position of axes that an M code, ten times its number, may move is not known from here on."""
         profile = self.profile
-        if code in profile.still_m or (profile.m61_sets_tool and code == SET_TOOL):
+        if not moving_m(profile, (code,)):
             return
         moved = self.tool_change_axes if code == TOOL_CHANGE else (0, 1, 2)
         found = departure((), {code}) if code != TOOL_CHANGE else _BY_TOOL_CHANGE

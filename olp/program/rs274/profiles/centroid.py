@@ -13,10 +13,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from olp.core.patterns import pattern
-from olp.program.rs274.codes import CUTTER_COMPENSATION
 from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.profiles.base import M_REFUSALS, Act, g_codes
 from olp.program.rs274.profiles.iso import ISO
+from olp.program.rs274.profiles.words import OPEN_CONTOURS
 
 _LACKING = frozenset({382, 383, 384, 385, 541, 860, 870, 880})
 _REFUSED = {
@@ -31,11 +31,7 @@ _REFUSED = {
         code: f"G{code // 10} turns the plane of arcs, which is not read; post them as moves"
         for code in (1170, 1180, 1190)
     },
-    **{
-        code: f"G{code / 10:g} makes corners of contours in a way that is not known; post the path of the "
-        "tool without compensation"
-        for code in CUTTER_COMPENSATION
-    },
+    **OPEN_CONTOURS,
 }
 
 DIALECT = replace(

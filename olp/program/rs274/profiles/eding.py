@@ -16,15 +16,11 @@ from olp.core.patterns import pattern
 from olp.program.rs274.codes import CUTTER_COMPENSATION
 from olp.program.rs274.profiles.base import ISO_M, M_REFUSALS, REFUSALS, Act, g_codes
 from olp.program.rs274.profiles.mach3 import DIALECT as MACH3
+from olp.program.rs274.profiles.words import OPEN_CONTOURS
 
 #: None of the codes that its posts write.
 _UNWRITTEN = frozenset({100, 382, 383, 384, 385, 520, 730, 740, 840, 901, 911, 930, 960, 970})
-_CONTOURS = {
-    code: f"G{code // 10} makes corners of contours in a way that is not known; post the path of the tool "
-    "without compensation"
-    for code in CUTTER_COMPENSATION
-    if code in (410, 420)
-}
+_CONTOURS = {code: OPEN_CONTOURS[code] for code in (410, 420)}
 
 DIALECT = replace(
     MACH3,

@@ -15,6 +15,7 @@ from dataclasses import replace
 from olp.program.rs274.codes import COMMON_CYCLES, CUTTER_COMPENSATION
 from olp.program.rs274.profiles.base import ISO_M, M_REFUSALS, NO_CODE, REFUSALS, Act, g_codes
 from olp.program.rs274.profiles.mach3 import DIALECT as MACH3
+from olp.program.rs274.profiles.words import OPEN_CONTOURS
 from olp.program.rs274.tool_points import translate
 
 _LACKING = frozenset({100, 300, 382, 383, 384, 385, 520, 610, 640, 920, 930})
@@ -27,12 +28,7 @@ _REFUSED = {
     280: f"G28 is not read on this control; {_POST}",
     530: f"G53 is a work offset on some of these controls, and positions of the machine on others; {_POST}",
     **{code: f"G{code // 10} has words of its own on this control; {_POST}" for code in COMMON_CYCLES},
-    **{
-        code: f"G{code // 10} makes corners of contours in a way that is not known; post the path of the "
-        "tool without compensation"
-        for code in CUTTER_COMPENSATION
-        if code in (410, 420)
-    },
+    **{code: OPEN_CONTOURS[code] for code in (410, 420)},
 }
 
 DIALECT = replace(

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Protocol
 
 from olp.program.dialect import Row, Support
 from olp.program.rs274.block_text import BlockText
+from olp.program.rs274.codes import CUTTER_COMPENSATION, SET_TOOL
 from olp.program.rs274.commands import Commands
 from olp.program.rs274.flatten.language import UNROLL, Language
 
 _LOST = "may move the axes: no position is known behind it, until X, Y and Z have been commanded"
+
+#: Refusals of a control whose corners of contours are not known.
+OPEN_CONTOURS: Mapping[int, str] = {
+    code: f"G{code / 10:g} makes corners of contours in a way that is not known; post the path of the tool "
+    "without compensation"
+    for code in CUTTER_COMPENSATION
+}
 
 
 class Control(Protocol):
@@ -75,6 +83,11 @@ def _m_codes(profile: Control) -> Iterator[Row]:
         )
         yield Row(f"M{m / 10:g}", Support.REFUSED, said)
     yield Row("any other M", Support.READ, _LOST)
+
+
+def moving_m(profile: Control, m_codes: Iterable[int]) -> set[int]:
+    """Those of M codes, ten times their number, that are not known to move no axis."""
+    return set(m_codes) - profile.still_m - ({SET_TOOL} if profile.m61_sets_tool else set())
 
 
 def remedied(why: str) -> str:
