@@ -207,9 +207,9 @@ def _by_ending(file: str) -> str | None:
 def _by_text(data: Text) -> set[str]:
     """The dialects of statements that a text may be written in; none where it has no statements."""
     start = data[:_LOOKED_AT]
-    blocks = signs.ASIDE.sub(b"", start) if b"(" in start else start
-    if signs.ODD.search(blocks) is None:
+    if signs.is_plain(start):
         return set()
+    start = b"\n".join(line for line in start.split(b"\n") if not signs.is_plain(line))
     own = ((name, known.signs.own) for name, known in _KNOWN.items())
     counts = {name: len(sign.findall(start)) for name, sign in own if sign is not None}
     most = max(counts.values(), default=0)

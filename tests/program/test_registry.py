@@ -13,7 +13,7 @@ from olp.files.config import load_setup
 from olp.program import registry
 from olp.program.dialect import Row, Support
 from olp.program.registry import DIALECTS, dialect_of, find, named, read
-from olp.program.text.signs import ASIDE, ODD
+from olp.program.text.signs import is_plain
 
 HAAS = DIALECTS["haas"]
 SHARED = b"GOTO/1,2,3\n"
@@ -122,14 +122,16 @@ def test_a_line_that_only_one_dialect_has_shows_it(name: str, line: str) -> None
 
 
 @pytest.mark.parametrize("line", [line for lines in SIGNS.values() for line in lines] + ["GOTO/1", "FROM /1"])
-def test_a_line_that_shows_a_dialect_is_odd(line: str) -> None:
-    """Texts without an odd place are not searched for signs."""
+def test_a_line_that_shows_a_dialect_is_no_plain_block(line: str) -> None:
+    """Texts of plain blocks are not searched for signs."""
     for text in (line, line.lower()):
-        assert ODD.search(ASIDE.sub(b"", text.encode()))
+        assert not is_plain(text.encode())
 
 
-def test_a_text_of_plain_blocks_is_not_odd() -> None:
-    assert ODD.search(ASIDE.sub(b"", b"N10 G1 X-1.5Y+.5 Z2. F1E3 (L X+1 R0 FMAX)\r\nM30\n")) is None
+def test_a_text_of_plain_blocks_is_plain() -> None:
+    assert is_plain(b"N10 G1 X-1.5Y+.5 Z2. F1E3 (L X+1 R0 FMAX)\r\nM30\n")
+    for odd in (b"G1 X", b"G1 X Y1", b"GO", b"_", b"G641", b"X\xc41", b"X1;", b"%"):
+        assert not is_plain(odd) and not is_plain(b"G0 X1\n" + odd + b"\nG0")
 
 
 def test_a_dialect_is_imported_when_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,8 +14,8 @@ from olp.core.values import dataclass
 @dataclass(frozen=True, slots=True)
 class Signs:
     """`endings` are endings of files, in small letters, that only this dialect has. `own` matches what only
-    its texts say at the start of a line, `shared` what texts of other dialects say too. In every line that
-    shows a sign `ODD` finds something too."""
+    its texts say at the start of a line, `shared` what texts of other dialects say too. No line that shows a
+    sign is a plain block (`is_plain`)."""
 
     endings: tuple[str, ...] = ()
     own: re.Pattern[bytes] | None = None
@@ -23,9 +23,13 @@ class Signs:
 
 
 #: A comment in a block, which is no sign.
-ASIDE = pattern(rb"\([^)\r\n]*\)")
-#: What a text of plain blocks does not have: a letter that no number follows, a mark, and G641 to G645.
-ODD = pattern(rb"[A-Za-z_](?![-+.\d])|[^\w\s.+-]|[Gg]64[1-5]")
+_ASIDE = pattern(rb"\([^)\r\n]*\)")
+_G641 = pattern(rb"[Gg]64[1-5]")
+#: Letters, what numbers are made of, blanks, and marks.
+_KINDS = b"".join(
+    b"0" if c in b"+-.0123456789" else b" " if c.isspace() else b"A" if c.isalpha() or c == b"_" else b"!"
+    for c in map(bytes, zip(range(256)))
+)
 
 #: Statements of points that APT and DMIS share.
 _POINTS_BY_SLASH = pattern(rb"(?im)^[ \t]*(GOTO|RAPID|FROM)[ \t]*/")
@@ -127,3 +131,12 @@ INFORM = Signs(
         rb"MOV[JLCS][ \t]+[CP]\d+)"
     ),
 )
+
+
+def is_plain(text: bytes) -> bool:
+    """Whether a text is one of plain blocks: outside comments no letter without a number behind it, no mark,
+    and no G641 to G645."""
+    blocks = _ASIDE.sub(b"", text) if b"(" in text else text
+    kinds = blocks.translate(_KINDS)
+    bare = b"!" in kinds or b"AA" in kinds or b"A " in kinds or kinds.endswith(b"A")
+    return not bare and (b"64" not in blocks or _G641.search(blocks) is None)
