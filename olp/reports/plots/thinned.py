@@ -59,10 +59,13 @@ class Canvas:
         steps = np.ceil(np.abs(end - begin).max(axis=1, initial=0.0) / self.size_mm).astype(np.int64) + 1
         line = np.repeat(np.arange(len(steps)), steps)
         share = (np.arange(len(line)) - (np.cumsum(steps) - steps)[line] + 1) / steps[line]
-        place = begin[line] + share[:, None] * (end - begin)[line]
+        return self.cells(begin[line] + share[:, None] * (end - begin)[line]), line
+
+    def cells(self, place: Array) -> Index:
+        """The pixels of points (n, 2), as indices of the flat picture."""
         cell = np.floor((place - self.low_mm) / self.size_mm).astype(np.int64)
         cell = np.clip(cell, 0, np.array(self.shape[::-1]) - 1)
-        return cell[:, 1] * self.shape[1] + cell[:, 0], line
+        return np.asarray(cell[:, 1] * self.shape[1] + cell[:, 0])
 
 
 def widened(pixels: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -129,7 +132,10 @@ def painted(path: Path, canvas: Canvas) -> npt.NDArray[np.bool_]:
     pixels = np.zeros(canvas.shape, bool)
     xy = path.vertex_mm[:, :2]
     for some in spans(len(path)):
-        rows = some.start + np.flatnonzero(path.cutting[some])
+        rows, cell = np.flatnonzero(path.cutting[some]), canvas.cells(xy[some.start : some.stop + 1])
+        pixels.reshape(-1)[cell[rows]] = True
+        # chords of arcs are mostly in one pixel
+        rows = some.start + rows[cell[rows] != cell[rows + 1]]
         pixels.reshape(-1)[canvas.lines(xy[rows], xy[rows + 1])[0]] = True
     return widened(pixels)
 

@@ -15,10 +15,12 @@ def alike(columns: Sequence[Array | Index], within: Sequence[float]) -> Index:
     count = len(columns[0])
     group = np.zeros(count, np.int64)
     # a group that falls apart in a later column may fall apart in an earlier one, too
-    for _ in range(2):
+    for _ in range(min(len(columns), 2)):
         for column, gap in zip(columns, within, strict=True):
+            if not count or column.max() - column.min() <= gap:
+                continue
             order = np.lexsort((column, group))
-            own, values = group[order], np.asarray(column)[order]
+            own, values = group[order], column[order]
             new = np.ones(count, bool)
             new[1:] = (np.diff(own) != 0) | (np.diff(values) > gap)
             group[order] = np.cumsum(new) - 1

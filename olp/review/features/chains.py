@@ -44,10 +44,11 @@ class Chains:
 
     def points(self, which: Index, share: Array) -> Array:
         """(k, 2) points across the tool axis, at shares (k,) of some of the moves."""
-        point = self.start[which, :2] + share[:, None] * (self.end - self.start)[which, :2]
+        start, end = self.start[which, :2], self.end[which, :2]
+        point = start + share[:, None] * (end - start)
         turned = np.flatnonzero(self.sweep[which] != 0.0)
         arc = which[turned]
-        arm, last = (side[arc, :2] - self.centre[arc] for side in (self.start, self.end))
+        arm, last = (side[turned] - self.centre[arc] for side in (start, end))
         angle = np.arctan2(arm[:, 1], arm[:, 0]) + share[turned] * self.sweep[arc]
         radius = np.hypot(*arm.T) + share[turned] * (np.hypot(*last.T) - np.hypot(*arm.T))
         point[turned] = self.centre[arc] + radius[:, None] * np.stack((np.cos(angle), np.sin(angle)), axis=1)
@@ -55,9 +56,9 @@ class Chains:
 
     def box(self, which: Index) -> tuple[Array, Array]:
         """(3,) lowest and highest coordinates of some of the moves, arcs at steps of a sixteenth."""
-        flat = [self.points(which, np.full(len(which), share)) for share in _SHARES]
+        flat = self.points(np.repeat(which, len(_SHARES)), np.tile(_SHARES, len(which)))
         level = self.start[which, 2]
-        low, high = np.min(flat, axis=(0, 1)), np.max(flat, axis=(0, 1))
+        low, high = flat.min(axis=0), flat.max(axis=0)
         return np.append(low, level.min()), np.append(high, level.max())
 
     def sums(self, values: Array) -> Array:

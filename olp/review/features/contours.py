@@ -70,12 +70,12 @@ class Contour(FeatureKind):
         turn = ground.moves.turn(int(row[0]))
         low, high = chains.box(own)
         size = high - low
-        levels = np.unique(alike((chains.end[own, 2],), (ground.moves.near_mm,)))
+        levels = 1 + int(alike((chains.end[own, 2],), (ground.moves.near_mm,)).max())
         detail = [f"path {number(float(size[0]))} x {number(float(size[1]))} mm"]
         detail.append("closed" if _closed(chains, int(which[0]), ground.moves.near_mm) else "open")
         level = ground.moves.level(int(row[0]), turn[:, 2]) or "1 level"
-        detail.append(level if len(levels) == 1 else counted(len(levels), "level"))
-        step = (chains.end - chains.start)[own]
+        detail.append(level if levels == 1 else counted(levels, "level"))
+        step = chains.end[own] - chains.start[own]
         centre = np.concatenate((chains.centre[own], chains.start[own, 2:]), axis=1)
         shape = _Shape(turn, row, unit(step) @ turn.T, centre @ turn.T, chains.sweep[own] != 0.0)
         place = turn @ ((low + high) / 2.0)
@@ -115,11 +115,11 @@ def _closed(chains: Chains, chain: int, near_mm: float) -> bool:
     np.minimum.at(first, place, done)
     if (done - first[place]).max() > done[-1] / 2.0:
         return True
+    if len(own) < 3 or chains.sweep[own[0]] != 0.0:
+        return False
     # it may end on the line with which it began
-    start, end = chains.start[own[0], :2], chains.end[own[0], :2]
-    last = vertices[-1:]
-    off = segment_distance(last, start[None], end[None])[0]
-    return bool(len(own) > 2 and chains.straight[own[0]] and off <= near_mm)
+    start, end = chains.start[own[:1], :2], chains.end[own[:1], :2]
+    return bool(segment_distance(vertices[-1:], start, end)[0] <= near_mm)
 
 
 def _same(ground: Ground, chains: Chains, some: Index) -> Index:
