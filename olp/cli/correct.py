@@ -119,8 +119,8 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
                 written[Path(outputs.review_file)] = _review(call, result, options, outputs, show)
         except ProgramError as error:
             raise error.in_file(call.stream or call.program) from None
-    for name in files_of(outputs.report_file):
-        written[Path(name)] = _report(call, result, options, name)
+        for name in files_of(outputs.report_file):
+            written[Path(name)] = _report(call, result, options, name, show)
     write_files(written, force=outputs.force, inputs=call.inputs)
     _say(call, result, outputs, written)
     exit_for(result.findings, outputs.fail_on)
@@ -163,14 +163,17 @@ def _review(
     viewed = options_of(review.ViewOptions, asdict(options) | {"time": time})
     return review.run(
         call.session, call.source, viewed, correction=result, corrected_name=name, progress=show
-    ).parts()
+    ).parts(progress=show)
 
 
-def _report(call: Given, result: Correction, options: CorrectOptions, name: str) -> bytes:
+def _report(
+    call: Given, result: Correction, options: CorrectOptions, name: str, show: Report | None
+) -> bytes:
     """The report as a file, on the program that was corrected: unrolled where the call asks for it."""
     from olp.workflows import report
 
-    return report.correction(result, call.source.holding(result.nominal), call.session, options, name)
+    nominal = call.source.holding(result.nominal)
+    return report.correction(result, nominal, call.session, options, name, progress=show)
 
 
 def _say(call: Given, result: Correction, outputs: _Outputs, written: Iterable[Path]) -> None:

@@ -9,6 +9,7 @@ import click
 
 from olp.cli.common import STREAM, diagnostic, files_of, given, options_of, put, refuse_early
 from olp.cli.options import cycle_options, force_option, output_option, quiet_option, setup_options
+from olp.cli.progress import progress
 
 
 @click.command("flatten")
@@ -16,7 +17,7 @@ from olp.cli.options import cycle_options, force_option, output_option, quiet_op
 @setup_options
 @cycle_options
 @output_option("OUT", "Default: stdout.", default=STREAM)
-@quiet_option("No messages.")
+@quiet_option("No messages and no progress.")
 @force_option("the output file")
 def command(
     program: str | None,
@@ -37,7 +38,7 @@ def command(
     if joints.on_joints(machine, job):
         make, inputs = joints.flatten(program, machine, job, words)
     else:
-        make, inputs = _of_three(program, machine, job, words)
+        make, inputs = _of_three(program, machine, job, words, quiet)
     refuse_early(files_of(output), inputs, force=force)
 
     from olp.files.write import write_bytes
@@ -52,7 +53,7 @@ def command(
 
 
 def _of_three(
-    program: str | None, machine: str | None, job: str | None, words: dict[str, Any]
+    program: str | None, machine: str | None, job: str | None, words: dict[str, Any], quiet: bool
 ) -> tuple[Callable[[], bytes], tuple[str, ...]]:
     """What unrolls a program for three linear axes, and the files that it reads."""
     call = given(program, machine, job)
@@ -60,6 +61,7 @@ def _of_three(
     def make() -> bytes:
         from olp.workflows import flatten
 
-        return flatten.run(call.session, call.source, options_of(flatten.UnrollOptions, words))
+        with progress(quiet) as show:
+            return flatten.run(call.session, call.source, options_of(flatten.UnrollOptions, words), show)
 
     return make, call.inputs

@@ -35,6 +35,7 @@ from olp.cli.options import (
     setup_options,
     units_option,
 )
+from olp.cli.progress import progress
 from olp.core.errors import UsageError
 from olp.core.values import dataclass
 
@@ -82,7 +83,7 @@ class _Asked:
 @json_option()
 @units_option
 @fail_on_option
-@quiet_option("No report; only the exit code.")
+@quiet_option("No report and no progress; only the exit code.")
 @force_option()
 def command(results: str, machine: str | None, job: str | None, **words: Any) -> None:
     """Correct the points that a measuring machine reported.
@@ -118,7 +119,8 @@ def command(results: str, machine: str | None, job: str | None, **words: Any) ->
         tip_radius_mm=asked.tip_radius_mm, decimals=asked.decimals, outside_box=asked.outside_box,
         date=asked.date, accept=asked.accept,
     )  # fmt: skip
-    result = workflow.run(call.session, call.source, options)
+    with progress(asked.quiet) as show:
+        result = workflow.run(call.session, call.source, options, show)
     written: dict[Path, Content] = {Path(name): result.parts() for name in files_of(output)}
     for name in files_of(asked.report_file):
         from olp.workflows import report as report_files

@@ -17,6 +17,7 @@ from olp.cli.options import (
     program_options,
     quiet_option,
 )
+from olp.cli.progress import progress
 from olp.core.errors import UsageError
 from olp.findings.rule import Severity
 
@@ -31,7 +32,7 @@ from olp.findings.rule import Severity
 )
 @doubt_options
 @json_option()
-@quiet_option("No messages.")
+@quiet_option("No messages and no progress.")
 @force_option("the output file")
 def command(
     program: str | None,
@@ -63,16 +64,18 @@ def command(
     from olp.workflows import simulate
 
     options = options_of(simulate.SimulateOptions, words)
-    result = simulate.run(call.session, call.source, options)
+    with progress(quiet) as show:
+        result = simulate.run(call.session, call.source, options, show)
     if not quiet:
         for finding in result.findings:
             if finding.severity > Severity.INFO:
                 diagnostic(f"olp: warning: {finding.code}: {finding.message}")
     if output not in (None, STREAM):
-        write_bytes(output, result.to_csv(), force=force, inputs=call.inputs)
+        with progress(quiet) as show:
+            write_bytes(output, result.parts(show), force=force, inputs=call.inputs)
         if not quiet:
             diagnostic(f"wrote {output}: {len(result.points_mm)} points in frame {result.frame}")
     if as_json:
         put(to_json(result.report))
     elif output in (None, STREAM):
-        put(result.to_csv())
+        put(result.parts())

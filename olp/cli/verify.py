@@ -15,6 +15,7 @@ from olp.cli.options import (
     proof_options,
     quiet_option,
 )
+from olp.cli.progress import progress
 from olp.core.errors import UsageError
 
 
@@ -26,7 +27,7 @@ from olp.core.errors import UsageError
 @proof_options
 @confidence_options
 @outside_box_option("refuse the program", "take the error at the box's face", default="hold")
-@quiet_option("No report; only the exit code.")
+@quiet_option("No report and no progress; only the exit code.")
 def command(
     nominal: str, corrected: str, machine: str | None, job: str | None, as_json: bool, fail_on: str,
     quiet: bool, **words: Any,
@@ -51,7 +52,8 @@ def command(
     from olp.workflows import verify
 
     options = options_of(verify.VerifyOptions, words)
-    result = verify.run(call.session, call.source, source(call.session.sources, corrected), options)
+    with progress(quiet or as_json) as show:
+        result = verify.run(call.session, call.source, source(call.session.sources, corrected), options, show)
     if as_json:
         put(report.to_json(result.report))
     elif not quiet:

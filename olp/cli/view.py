@@ -91,12 +91,14 @@ def command(
         _serve(make, inputs, port, quiet)
         return
     page = make()
+    with progress(quiet) as show:
+        parts = page.parts(progress=show)
     if output == STREAM:
-        put(page.html())
+        put(parts)
         return
     from olp.files.write import write_bytes
 
-    write_bytes(output, page.parts(), force=force, inputs=inputs)
+    write_bytes(output, parts, force=force, inputs=inputs)
     if not quiet:
         diagnostic(
             f"wrote {output}: {len(page.scene.samples)} points, {Path(output).stat().st_size / 1e6:.1f} MB"

@@ -9,8 +9,9 @@ import numpy as np
 
 from olp.comparison.path import Path, PathParts
 from olp.compensation.plan import Targets, zero_shifts
-from olp.core.arrays import Array, Index, Mask
-from olp.core.geometry import arc_points
+from olp.core.arrays import Array, Index, Mask, all_in_row
+from olp.core.geometry import ArcShapes
+from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
@@ -36,8 +37,9 @@ class Nominal:
 
 
 def nominal_of(
-    toolpath: Toolpath, model: ErrorModel | None, positions: Literal["tip", "axes"], *, points: bool = False
-) -> Nominal:
+    toolpath: Toolpath, model: ErrorModel | None, positions: Literal["tip", "axes"], *, points: bool = False,
+    tell: Progress = silent,
+) -> Nominal:  # fmt: skip
     """The commanded path of a program, arcs within CHORD_MM; `points`: its dialect has points, no paths.
 
     "axes": axis positions in the machine frame. "tip": of the tip in the first work frame, as `simulate`
@@ -58,9 +60,12 @@ def nominal_of(
             lengths = toolpath.per_frame(of_frames, some.start, some.stop)
             lengths = lengths if lengths.ndim == 1 else lengths[move]
             place = toolpath.frames[first].tip_mm(place - shift[first] - lengths)
-        known = np.isfinite(place).all(axis=1)
-        place, move = place[known], some.start + move[known]
+        move += some.start
+        known = all_in_row(np.isfinite(place))
+        if not known.all():
+            place, move = place[known], move[known]
         parts.put(place, move, along[move], at_end[move])
+        tell("nominal path", some.stop / len(toolpath))
     path = parts.path()
     stops = replace(path.stops, line=_lines(toolpath, path.stops.line))
     return Nominal(replace(path, line=_lines(toolpath, path.line), stops=stops), path.line, path.stops.line)
@@ -103,8 +108,10 @@ def _chords(toolpath: Toolpath, end: Array) -> tuple[Array, Index]:
     which[arcs.move] = np.arange(len(arcs))
     inner = np.flatnonzero((which[move] >= 0) & (share < 1.0))
     arc = which[move[inner]]
-    points[inner] = arc_points(
-        start[arc], toolpath.end_mm[arcs.move[arc]], arcs.centre_mm[arc], arcs.plane[arc],
-        arcs.sweep_rad[arc], share[inner],
-    ) + (end - toolpath.end_mm)[move[inner]]  # fmt: skip
+    shapes = ArcShapes.of(start, toolpath.end_mm[arcs.move], arcs.centre_mm, arcs.plane, arcs.sweep_rad)
+    on_arcs = shapes.at(arc, share[inner])
+    shift = end - toolpath.end_mm
+    if shift.any():
+        on_arcs += shift[move[inner]]
+    points[inner] = on_arcs
     return points, move

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from olp.core.errors import ProgramError
+from olp.core.progress import Progress, silent
 from olp.core.values import dataclass
 
 #: Bytes of blocks that the run of a short parametric program may visit, and for each byte of a longer one.
 RUN_BYTES = 12_000_000
 RUN_PER_BYTE = 80
+#: So often a run tells how far it is.
+_TOLD = 500
 _RUN_TOO_LONG = (
     "the run visits more than {limit} bytes of blocks; correct an endless loop, or divide the program"
 )
@@ -16,11 +19,13 @@ _RUN_TOO_LONG = (
 @dataclass(slots=True)
 class Budget:
     """An amount of work that may be spent once. `message` is raised where it is exceeded, with {limit} put
-    in."""
+    in. `tell` is told what share of it is spent."""
 
     limit: int
     message: str
+    tell: Progress = silent
     spent: int = 0
+    told: int = 0
 
     @classmethod
     def of(cls, size: int, *, least: int, per_byte: float, message: str) -> Budget:
@@ -28,10 +33,12 @@ class Budget:
         return cls(max(least, int(per_byte * size)), message)
 
     @classmethod
-    def of_run(cls, size: int, limit: int = RUN_BYTES, message: str = _RUN_TOO_LONG) -> Budget:
+    def of_run(
+        cls, size: int, limit: int = RUN_BYTES, message: str = _RUN_TOO_LONG, tell: Progress = silent
+    ) -> Budget:
         """For what a parametric program of `size` bytes makes: `limit`, or `RUN_PER_BYTE` where that is
         more."""
-        return cls.of(size, least=limit, per_byte=RUN_PER_BYTE, message=message)
+        return cls(max(limit, RUN_PER_BYTE * size), message, tell)
 
     @property
     def left(self) -> int:
@@ -43,3 +50,6 @@ class Budget:
         self.spent += amount
         if self.spent > self.limit:
             raise ProgramError(self.message.format(limit=self.limit), code="OLP543")
+        if self.spent - self.told > self.limit // _TOLD:
+            self.told = self.spent
+            self.tell("unroll", self.spent / self.limit)

@@ -15,7 +15,7 @@ import numpy as np
 from olp.core.arrays import Array, Index
 from olp.core.errors import naming
 from olp.core.machine import Setup
-from olp.core.progress import Progress, silent
+from olp.core.progress import Progress, part, silent
 from olp.core.spool import Text
 from olp.core.units import MM_PER_UM
 from olp.core.values import dataclass
@@ -72,11 +72,13 @@ class Review:
     scene: Scene
     _packed: list[tuple[dict[str, Any], bytes]] = field(default_factory=list, init=False, repr=False)
 
-    def parts(self, live: Mapping[str, str] | None = None) -> Iterator[bytes]:
+    def parts(
+        self, live: Mapping[str, str] | None = None, progress: Progress | None = None
+    ) -> Iterator[bytes]:
         """The page in parts. In `live`, `address`, relative to the page, answers with `proof`, a blank and
         the digest of the current inputs."""
         if not self._packed:
-            manifest, arrays = manifest_of(self.scene)
+            manifest, arrays = manifest_of(self.scene, progress or silent)
             self._packed.append((manifest, arrays.encoded()))
         manifest, data = self._packed[0]
         return page(manifest | {"live": live}, data, live=live is not None)
@@ -155,7 +157,7 @@ def run(
     with program.errors():
         loaded = session.loaded(outside, only_sure=options.only_sure_components).reading(program)
         tell("read", 0.0)
-        reading = Options()
+        reading = Options(tell=tell)
         text, nominal = refusals.read(
             session.sources, program, loaded.setup, loaded.dialect, reading, options, kept=True
         )
@@ -177,7 +179,7 @@ def run(
         second, nominal = done, done.nominal
         del done
     with naming(corrected_name or (f"{program.name} (corrected)" if program.name else "")):
-        texts = _proved(session.sources, program, nominal, second, corrected_name, loaded, options)
+        texts = _proved(session.sources, program, nominal, second, corrected_name, loaded, options, tell)
         del second, nominal
         shown = _shown(session, texts, seconds, loaded, options, progress)
     tell("pack", 0.0)
@@ -215,21 +217,23 @@ def _corrected(session: Session, data: Text, loaded: Loaded, options: ViewOption
 
 def _proved(
     sources: Sources, program: Source, nominal: Program, corrected: Source | Correction | Run, name: str,
-    loaded: Loaded, options: ViewOptions,
+    loaded: Loaded, options: ViewOptions, tell: Progress,
 ) -> _Texts:  # fmt: skip
     """Both programs with their correction, or with the verification of the corrected one, `name`."""
     if isinstance(corrected, Run):
         report = placed(corrected.report, nominal.origin)
         groups = corrected.proof.groups
         return _Texts(program, nominal, name, corrected.corrected, report, corrected.table, groups)
-    reading = Options()
+    reading = Options(tell=part(tell, 0.0, 0.25))
     if isinstance(corrected, Correction):
         second = read(corrected.plain, loaded.setup, loaded.dialect, reading)
         report, table, groups = corrected.report, corrected.table, corrected.groups
         return _Texts(program, nominal, name, second, report, table, groups)
     unrolling = unrolling_of_corrected(nominal)
     _, second = refusals.read(sources, corrected, loaded.setup, loaded.dialect, reading, unrolling)
-    run = verify_programs((nominal, program.name), (second, name), loaded, options, outside="OLP403")
+    run = verify_programs(
+        (nominal, program.name), (second, name), loaded, options, outside="OLP403", tell=part(tell, 0.25, 1.0)
+    )
     report, groups = placed(run.report, nominal.origin), run.proof.groups
     return _Texts(program, nominal, name, second, report, run.table, groups)
 
@@ -239,8 +243,9 @@ def _shown(
     progress: Progress | None,
 ) -> _Shown:  # fmt: skip
     """Samples, with the motion, or with the times at the programmed feed of moves that take `seconds`."""
-    (progress or silent)("sample", 0.0)
-    samples = sample(texts.nominal, texts.second, texts.groups, loaded.model, options.step_mm)
+    tell = progress or silent
+    tell("sample", 0.0)
+    samples = sample(texts.nominal, texts.second, texts.groups, loaded.model, options.step_mm, tell)
     samples = with_starts(samples, texts.nominal, texts.table)
     if seconds is not None:
         return _Shown(samples, by_feed(seconds, samples), None)
@@ -373,9 +378,9 @@ def _resting(samples: Samples, arrival: Array, leaving: Array) -> tuple[Samples,
 def _digest(texts: _Texts, loaded: Loaded, measured: Sequence[str], sources: Sources) -> str:
     """12 digits that change with every input of the page; `measured` are the digests of those files."""
     combined = hashlib.sha256(texts.nominal.data)
-    for part in (texts.second.data, loaded.digest.encode(), _stated(loaded.setup).encode()):
+    for text in (texts.second.data, loaded.digest.encode(), _stated(loaded.setup).encode()):
         combined.update(b"\0")
-        combined.update(part)
+        combined.update(text)
     for digest in measured:
         combined.update(bytes.fromhex(digest))
     for mesh in loaded.setup.job.meshes:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
+from olp.core.progress import Progress, part, silent
 from olp.core.toolpath import Kind
 from olp.core.units import UM_PER_MM
 from olp.findings.catalogue import RULES
@@ -64,20 +65,31 @@ def curve_um(size_mm: npt.NDArray[Any]) -> Curve:
     return Curve.of(value, resolution(float(value.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS))
 
 
-def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
+def manifest_of(scene: Scene, tell: Progress = silent) -> tuple[dict[str, Any], Arrays]:
     """The manifest of a scene, and the arrays that it names."""
     arrays = Arrays()
+    tell("pack", 0.0)
     origin = np.round(scene.position_mm.mean(axis=0))
     base = arrays.quantised("P", scene.position_mm, POSITION_MM, less=origin, keep=True)
     # three axes go as the path does
+    tell("pack", 0.05)
     like = [base] if scene.axes.shape[1] == len(origin) else []
     arrays.quantised("Q", scene.axes, POSITION_MM, less=scene.drawn_at, plus=like)
     row = scene.listing.row_of(scene.nominal.toolpath.line[scene.samples.move].astype(np.int64))
     arrays.quantised("line", row, 1.0)
+    tell("pack", 0.1)
     arrays.raw("rapid", rapid(scene), "u1")
     arrays.raw("waypoint", scene.waypoint.astype(np.uint8), "u1")
     arrays.along("t", scene.time_s, TIME_S, "P")
+    tell("pack", 0.15)
     arrays.along("s", scene.samples.arc_mm, ARC_MM, "P")
+    # long programs: about a fifth of the time each
+    tell("pack", 0.2)
+    layers = _layers(scene, arrays, origin)
+    tell("pack", 0.3)
+    metrics = _metrics(scene, arrays)
+    tell("pack", 0.4)
+    motion, listing = _motion(scene, arrays), _listing(scene, arrays, part(tell, 0.4, 0.8))
     manifest = {
         "schema": "olp-review-1",
         "title": pictured(f"{scene.name} on {scene.machine}"),
@@ -99,11 +111,11 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "way": "s",
         "time_source": "retimed" if scene.planned else "feed",
         "duration_s": scene.duration_s,
-        "layers": _layers(scene, arrays, origin),
-        "metrics": _metrics(scene, arrays),
+        "layers": layers,
+        "metrics": metrics,
         "sources": [f"source:{name}" for name, _ in scene.sources],
-        "motion": _motion(scene, arrays),
-        "listing": _listing(scene, arrays),
+        "motion": motion,
+        "listing": listing,
         "meshes": list(_meshes(scene, arrays, origin)),
         "nodes": [asdict(node) for node in scene.nodes],
         "axes": "Q",
@@ -120,6 +132,7 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "tool_radius_mm": scene.tool_radius_mm,
         "live": None,
     }
+    tell("pack", 0.9)
     return manifest | {"arrays": arrays.specs}, arrays
 
 
@@ -262,13 +275,16 @@ def _motion(scene: Scene, arrays: Arrays) -> dict[str, Any] | None:
     }
 
 
-def _listing(scene: Scene, arrays: Arrays) -> dict[str, Any]:
+def _listing(scene: Scene, arrays: Arrays, tell: Progress) -> dict[str, Any]:
     listing = scene.listing
+    nominal = arrays.lines("text_nominal", listing.nominal, ["P"], listing.sample_nominal)
+    tell("pack", 0.5)
+    by = ["P", "d_command"]
+    corrected = arrays.lines("text_corrected", listing.corrected, by, listing.sample_corrected)
+    tell("pack", 0.9)
     return {
-        "nominal": arrays.lines("text_nominal", listing.nominal, ["P"], listing.sample_nominal),
-        "corrected": arrays.lines(
-            "text_corrected", listing.corrected, ["P", "d_command"], listing.sample_corrected
-        ),
+        "nominal": nominal,
+        "corrected": corrected,
         "row_nominal": arrays.quantised("row_nominal", listing.row_nominal, 1.0),
         "row_corrected": arrays.quantised("row_corrected", listing.row_corrected, 1.0),
         **_names(scene, arrays),

@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.plan import zero_shifts
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.errors import CannotCompute
+from olp.core.progress import Progress, silent
 from olp.core.toolpath import Kind, Toolpath
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
@@ -89,8 +90,9 @@ class Samples:
 
 
 def sample(
-    nominal: Program, corrected: Program, groups: Index, model: ErrorModel, step_mm: float | None = None
-) -> Samples:
+    nominal: Program, corrected: Program, groups: Index, model: ErrorModel, step_mm: float | None = None,
+    tell: Progress = silent,
+) -> Samples:  # fmt: skip
     """Samples every `step_mm`, or finer where the error requires it.
 
     `groups` (n,) is the last corrected move of each nominal move. Between waypoints the tip of the corrected
@@ -111,16 +113,20 @@ def sample(
         command = other.at(part, within)
         play_there = plays(model, command)
     axis = ends.at(move, share)
+    tell("sample", 0.3)
     tip = _Tip(model, path, shift)
     play = plays(model, axis)
     # deviations in half the memory: that is finer than the page shows
     joints = SmoothJoints.of(path)
     result = tip.deviation(move, share, axis, axis, play)
     uncorrected = _across(joints, move, share, result).astype(np.float32)
+    tell("sample", 0.5)
     result = tip.deviation(move, share, axis, command, play_there)
+    tell("sample", 0.7)
     beside = set_beside(ends, other, parts, move, share, part, within, command, result)
-    rows = np.union1d(beside, set_in_holes(nominal, corrected, move, axis, command))
+    rows = distinct(np.concatenate((beside, set_in_holes(nominal, corrected, move, axis, command))))
     own = None if play_there is None else play_there[rows]
+    tell("sample", 0.8)
     result[rows] = tip.deviation(move[rows], share[rows], axis[rows], command[rows], own)
     corrected_mm = _across(joints, move, share, result).astype(np.float32)
     del result

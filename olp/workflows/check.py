@@ -20,7 +20,7 @@ from olp.checks.stamps import stamp_findings
 from olp.compensation.stamp import find_stamp
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
-from olp.core.progress import Progress, silent
+from olp.core.progress import Progress, part, silent
 from olp.core.spool import Text
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.core.values import dataclass
@@ -96,7 +96,6 @@ class _Case:
     run: Run | None
     proof: Proof | None
     loaded: Loaded
-    reading: Options
     checked: str
     corrected_here: bool = False
 
@@ -114,7 +113,7 @@ class _Case:
         """A program with its words; a correction drops them early."""
         if program.words is not None:
             return program
-        return read(program.data, self.loaded.setup, self.loaded.dialect, self.reading)
+        return read(program.data, self.loaded.setup, self.loaded.dialect)
 
 
 def check(
@@ -239,38 +238,40 @@ def _case(
     tell: Progress,
 ) -> _Case:  # fmt: skip
     tell("read", 0.0)
-    reading = Options()
+    reading = Options(tell=part(tell, 0.0, 0.2))
     name, data = program.name, program.data
     if nominal is None and find_stamp(data) is None:
         correcting = CorrectOptions(**options.proof(), outside_box="hold")
-        run = corrected(sources, program, loaded, correcting, tell, options.outside_code, refuse_doubts=False)
+        told = part(tell, 0.0, 0.8)
+        run = corrected(sources, program, loaded, correcting, told, options.outside_code, refuse_doubts=False)
         what = "the result of olp correct on the program"
         path = replace(run.proof.written, line=run.proof.nominal.line[run.proof.owner()])
         proof = replace(run.proof, written=path)
-        return _Case(name, data, run.corrected, run, proof, loaded, reading, what, corrected_here=True)
+        return _Case(name, data, run.corrected, run, proof, loaded, what, corrected_here=True)
     if nominal is None:
         program, written = refusals.read(
             sources, program, loaded.setup, loaded.dialect, reading, options, kept=True
         )
         what = "the corrected program; checks that need the nominal one are left out (give --nominal)"
-        return _Case(name, data, written, None, None, loaded, reading, what)
+        return _Case(name, data, written, None, None, loaded, what)
     nominal.load()
     with nominal.errors("<nominal>"):
         nominal, first = refusals.read(
             sources, nominal, loaded.setup, loaded.dialect, reading, options, kept=True
         )
     unrolling = unrolling_of_corrected(first)
-    program, written = refusals.read(sources, program, loaded.setup, loaded.dialect, reading, unrolling)
+    second = Options(tell=part(tell, 0.2, 0.4))
+    program, written = refusals.read(sources, program, loaded.setup, loaded.dialect, second, unrolling)
     run = verify_programs(
         (first, nominal.name), (written, name), loaded, options,
-        outside=options.outside_code, refuse_doubts=False,
+        outside=options.outside_code, refuse_doubts=False, tell=part(tell, 0.4, 0.8),
     )  # fmt: skip
     what = f"the corrected program against the nominal one ({nominal.short or 'stdin'})"
     proof = replace(
         run.proof,
         nominal=replace(run.proof.nominal, line=written.in_original().toolpath.line[run.proof.groups]),
     )
-    return _Case(name, data, written, run, proof, loaded, reading, what)
+    return _Case(name, data, written, run, proof, loaded, what)
 
 
 def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
@@ -373,8 +374,8 @@ def _verdict(
     line = result["numerical"]["line"]
     if not case.corrected_here and line is not None:
         result["numerical"]["line"] = _lines(run)[line]
-    for part, code in (("numerical", "OLP101"), ("part", "OLP108")):
-        if code not in codes and result[part] is not None and not result[part]["holds"]:
+    for side, code in (("numerical", "OLP101"), ("part", "OLP108")):
+        if code not in codes and result[side] is not None and not result[side]["holds"]:
             result["sentences"].append(f"{code} is left out, so that does not count here.")
     return result | {"ok": not any(f.severity >= Severity.ERROR for f in kept)}
 

@@ -238,7 +238,7 @@ def _proved(
         run = prove(done.text)
     else:
         with provably_kept():
-            text = unrolled_again(sources, program, done.text.data, loaded)
+            text = unrolled_again(sources, program, done.text.data, loaded, part(tell, 0.7, 0.74))
             run = prove(text, findings_of(done.flow))
             # where the unrolled program is no better, its flow is not the reason, nor where none was kept
             flat = done.unrolled

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
+from olp.core.progress import Progress, silent
 from olp.core.spool import whole
 from olp.core.values import dataclass
 from olp.files.sources import Source, Sources
@@ -59,6 +60,7 @@ def flatten(
     *,
     expand_cycles: bool = False,
     peck_clearance_mm: float | None = None,
+    progress: Progress | None = None,
 ) -> bytes:
     """The text of a program with loops, subprograms, expressions and, with `expand_cycles`, canned cycles
     written out as plain blocks. This is not lossless.
@@ -68,15 +70,16 @@ def flatten(
     """
     session, source = opened(program, machine, job, "<program>")
     options = UnrollOptions(flatten=True, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm)
-    return run(session, source, options)
+    return run(session, source, options, progress)
 
 
-def run(session: Session, program: Source, options: UnrollOptions) -> bytes:
+def run(session: Session, program: Source, options: UnrollOptions, progress: Progress | None = None) -> bytes:
     """As `flatten`, in a session."""
     program.load()
     with program.errors("<program>"):
         # a text of its own: what is said of it later has its own lines
-        return bytes(as_asked(session.sources, program, *session.reading(program), options).data)
+        reading = session.reading(program)
+        return bytes(as_asked(session.sources, program, *reading, options, tell=progress or silent).data)
 
 
 def as_asked(
@@ -87,11 +90,12 @@ def as_asked(
     options: UnrollOptions,
     *,
     block_delete: bool | None = None,
+    tell: Progress = silent,
 ) -> Source:
     """The program, unrolled where the options ask for it and it is not yet. Subprograms are searched in its
     folder. `block_delete` is the position of that switch, None where the result has to be right for both.
     Raises UsageError for a dialect that cannot be unrolled, ProgramError with the line of the original."""
-    unroll = unroller(sources, program, setup, dialect, options, block_delete=block_delete)
+    unroll = unroller(sources, program, setup, dialect, options, block_delete=block_delete, tell=tell)
     return program if unroll is None else program.holding(unroll(as_it_is, None))
 
 
@@ -103,8 +107,10 @@ def unroller(
     options: UnrollOptions,
     *,
     block_delete: bool | None = None,
+    tell: Progress = silent,
 ) -> Unroll | None:
-    """What unrolls the program as in `as_asked`; None where there is nothing to do.
+    """What unrolls the program as in `as_asked`; None where there is nothing to do. `tell` is told how much
+    of the work that a run may cause is done.
 
     Payloads that the job gives by line become comments first, as unrolling changes the lines.
     """
@@ -127,7 +133,7 @@ def unroller(
             with_payloads(given, setup.job.payloads, dialect.comment), dialect.set_as(setup.machine),
             subprograms=changed,
             expand_cycles=options.expand_cycles, block_delete=block_delete,
-            peck_clearance=options.peck_clearance_mm, parameters=setup.job.parameters,
+            peck_clearance=options.peck_clearance_mm, parameters=setup.job.parameters, tell=tell,
             **({} if limit is None else {"limit": limit}),
             **({"setup": setup} if dialect.unrolls_with_tools else {}),
         )  # fmt: skip

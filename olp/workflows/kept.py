@@ -11,6 +11,7 @@ from contextlib import contextmanager
 
 from olp.core.arrays import Index
 from olp.core.errors import ProgramError, Reason, Refused
+from olp.core.progress import Progress
 from olp.core.spool import Text
 from olp.core.values import dataclass
 from olp.files.sources import Source, Sources
@@ -81,10 +82,10 @@ def unrolling_of_corrected(nominal: Program) -> UnrollOptions:
     return AS_IT_IS if nominal.origin is None else UnrollOptions(flatten=True)
 
 
-def unrolled_again(sources: Sources, program: Source, text: Text, loaded: Loaded) -> Source:
+def unrolled_again(sources: Sources, program: Source, text: Text, loaded: Loaded, tell: Progress) -> Source:
     """A corrected text whose flow was kept, unrolled as the nominal program was."""
     flat = UnrollOptions(flatten=True)
-    return as_asked(sources, program.holding(text), loaded.setup, loaded.dialect, flat)
+    return as_asked(sources, program.holding(text), loaded.setup, loaded.dialect, flat, tell=tell)
 
 
 @contextmanager

@@ -104,7 +104,7 @@ class Pair:
 
 def verify_programs(
     nominal: tuple[Program, str], corrected: tuple[Program, str], loaded: Loaded, options: ProofOptions,
-    *, outside: str | None, refuse_doubts: bool = True,
+    *, outside: str | None, refuse_doubts: bool = True, tell: Progress = silent,
 ) -> Run:  # fmt: skip
     """Prove a corrected program from any source; programs come with their names. `outside` is the code of
     findings outside the calibrated box; with None such a path raises OutsideBox, as in `correct`. Raises
@@ -128,7 +128,7 @@ def verify_programs(
                 uncorrected = uncorrected_moves(first, loaded.model, limits)
             texts = Source(name, lambda: first.data), Source(other, lambda: second.data)
             pair = Pair(first, texts[0], digest_of(first.data), second, texts[1], uncorrected)
-            return proved(pair, loaded.held(), options, doubts, outside=outside)
+            return proved(pair, loaded.held(), options, doubts, outside=outside, tell=tell)
     except ProgramError as error:
         raise error.in_file(other or "<corrected>") from None
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from olp.core.errors import ProgramError, Reason, Refused
 from olp.core.machine import Setup
+from olp.core.progress import part
 from olp.core.spool import in_parts
 from olp.files.sources import Source, Sources
 from olp.findings.catalogue import RULES, Finding
@@ -21,6 +22,8 @@ from olp.workflows.flatten import AS_IT_IS, UnrollOptions, as_asked, beside, unr
 _LINES = 10
 #: What of a reason names a file.
 _FILES = ("file", "follows_file")
+#: The share of reading that unrolling takes.
+_UNROLLED = 0.5
 
 #: The code of refused statements that a control may have and another not.
 _NO_SUCH_CODE = "OLP512"
@@ -43,7 +46,13 @@ def read(
     `block_delete` as in `as_asked`. With `kept` a program that needs it is unrolled unasked. Raises Refused
     with all the reasons where there are several, ProgramError where there is one; lines are those of the
     original."""
-    unroll = unroller(sources, program, setup, dialect, unrolling, block_delete=block_delete)
+    options = options or Options()
+    unroll = unroller(
+        sources, program, setup, dialect, unrolling, block_delete=block_delete,
+        tell=part(options.tell, 0.0, _UNROLLED),
+    )  # fmt: skip
+    if unroll is not None:
+        options = replace(options, tell=part(options.tell, _UNROLLED, 1.0))
     survey = partial(
         read_all, program.data, setup, dialect, options, words=words, subprograms=beside(sources, program),
         unroll=unroll, expands=unrolling.expand_cycles,
@@ -62,7 +71,7 @@ def read(
             parsed = survey()
     except ProgramError as error:
         raise _with_control(error, dialect) if setup.machine.assumed else error from None
-    if all(part.isspace() for part in in_parts(program.data)):
+    if all(some.isspace() for some in in_parts(program.data)):
         raise ProgramError("the file is empty; expected a program of at least one block", code="OLP501")
     return program if unroll is None else program.holding(parsed.data), parsed
 

@@ -16,6 +16,7 @@ from olp.comparison.path import Path
 from olp.core.arrays import Index, Mask
 from olp.core.errors import CannotCompute
 from olp.core.optional import takes_plots
+from olp.core.progress import Progress, part, silent
 from olp.core.toolpath import Toolpath, carried
 from olp.core.version import __version__
 from olp.errormodel.base import ErrorModel
@@ -74,10 +75,11 @@ def results(result: ResultCorrection, name: str, date: datetime.date | None) -> 
 
 def correction(
     result: Correction, nominal: Source, session: Session, options: CorrectOptions, name: str,
-    *, plots: bool = True,
+    *, plots: bool = True, progress: Progress | None = None,
 ) -> bytes:  # fmt: skip
     """The report of a correction in the form that `name` ends in; `nominal` is the program that was
     corrected, unrolled where the call asks for it. Only a page has `plots`."""
+    tell = progress or silent
     from olp.reports import document_correction as report_document
 
     tests = session.once("test_paths", lambda: _tests(session))
@@ -86,7 +88,9 @@ def correction(
         return to_json(report)
     drawn: dict[str, bytes] = {}
     if plots and takes_plots(name):
-        drawn = _predicted_plots(result, nominal, session, options) | _test_plots(report, name)
+        drawn = _predicted_plots(result, nominal, session, options, part(tell, 0.0, 0.8))
+        tell("report", 0.8)
+        drawn |= _test_plots(report, name)
         if result.confidence is not None and len(result.confidence):
             from olp.reports.plots import path as plots_path
 
@@ -114,50 +118,63 @@ def _test_plots(report: Mapping[str, Any], name: str) -> dict[str, bytes]:
 
 
 def _path_plots(
-    path: Path, groups: Mapping[str, Thinned], tolerance: float | None, sides: Mapping[str, str]
-) -> dict[str, bytes]:
+    path: Path, groups: Mapping[str, Thinned], tolerance: float | None, sides: Mapping[str, str],
+    tell: Progress = silent,
+) -> dict[str, bytes]:  # fmt: skip
     from olp.reports.plots import path as plots_path
 
+    tell("report", 0.0)
+    picture = plots_path.picture(path, groups, sides)
+    tell("report", 0.6)
+    along = plots_path.along(path, groups, tolerance, sides)
+    tell("report", 0.8)
     return {
-        "picture": plots_path.picture(path, groups, sides),
-        "along": plots_path.along(path, groups, tolerance, sides),
+        "picture": picture,
+        "along": along,
         "histogram": plots_path.histogram(groups, tolerance, sides),
     }
 
 
 def _predicted_plots(
-    result: Correction, nominal: Source, session: Session, options: CorrectOptions
+    result: Correction, nominal: Source, session: Session, options: CorrectOptions, tell: Progress
 ) -> dict[str, bytes]:
     """Plots of where the tip would go, with the nominal and with the corrected program."""
     from olp.reports.plots.thinned import Canvas, Thinned
 
     loaded = session.loaded("hold").reading(nominal)
-    reading = Options()
+    tell("report", 0.0)
+    reading = Options(tell=part(tell, 0.0, 0.1, "report"))
     program = read(nominal.data, loaded.setup, loaded.dialect, reading, words=False)
     try:
-        way = nominal_of(program.toolpath, loaded.model, "tip", points=program.dialect.points)
+        way = nominal_of(
+            program.toolpath, loaded.model, "tip", points=program.dialect.points,
+            tell=part(tell, 0.1, 0.3, "report"),
+        )  # fmt: skip
     except CannotCompute:
         return {}
+    reading = Options(tell=part(tell, 0.3, 0.4, "report"))
     corrected = read(result.plain, loaded.setup, loaded.dialect, reading, words=False)
     # points farther away are no part of the path, such as those of a tool change
     reach_mm = 10.0 * float(result.report["deviation"]["before"]["between"]["max_um"]) * 1e-3 + 0.1
     along, at_end = counting(program.toolpath, points=program.dialect.points)
     counts, canvas, groups = along | at_end, Canvas(way.path), {}
-    for side, path, last in (
-        ("before", program.toolpath, None),
-        ("after", corrected.toolpath, result.groups),
+    for side, path, last, told in (
+        ("before", program.toolpath, None, part(tell, 0.4, 0.5)),
+        ("after", corrected.toolpath, result.groups, part(tell, 0.5, 0.6)),
     ):
         groups[side] = Thinned(way.path, canvas)
-        for run in _runs(way, counts, path, last, loaded.model, reach_mm):
+        for run in _runs(way, counts, path, last, loaded.model, reach_mm, told):
             groups[side].add(run)
     if not all(group.points for group in groups.values()):
         return {}
-    return _path_plots(way.path, groups, float(result.report["verdict"]["numerical"]["allowed_um"]), SIDES)
+    tolerance = float(result.report["verdict"]["numerical"]["allowed_um"])
+    return _path_plots(way.path, groups, tolerance, SIDES, part(tell, 0.6, 1.0))
 
 
 def _runs(
-    nominal: Nominal, counts: Mask, path: Toolpath, last: Index | None, model: ErrorModel, reach_mm: float
-) -> Iterator[Run]:
+    nominal: Nominal, counts: Mask, path: Toolpath, last: Index | None, model: ErrorModel, reach_mm: float,
+    tell: Progress,
+) -> Iterator[Run]:  # fmt: skip
     """Where the tip goes along a path, part by part, set beside the nominal one, on nominal moves that count
     (n,). `last` (n,) is the last move of the path that belongs to each of them, None where each is its own.
     """
@@ -174,3 +191,4 @@ def _runs(
         segment = first + np.ceil(share * (behind - first)).astype(np.int64) - 1
         segment = np.clip(segment, 0, len(way) - 1)
         yield Run.of("", way, points, beside(way, points, segment), reach_mm, "free")
+        tell("report", float(move[-1]) / len(path))

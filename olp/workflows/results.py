@@ -16,6 +16,7 @@ from olp.checks.doubt_size import box_doubts
 from olp.compensation.stamp import find_stamp, line_of, stamp_line
 from olp.core.errors import AlreadyCorrected, InputError, UsageError
 from olp.core.machine import Setup
+from olp.core.progress import Progress, silent
 from olp.core.spool import Spool, whole
 from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
@@ -106,6 +107,7 @@ def correct_results(
     outside_box: Literal["refuse", "hold"] = "refuse",
     date: datetime.date | None = None,
     accept: Sequence[str] = (),
+    progress: Progress | None = None,
 ) -> ResultCorrection:
     """Correct the points that a measuring machine reported: true = reported + error at the touch.
 
@@ -121,10 +123,12 @@ def correct_results(
         profile=profile, frame=frame, tool=tool, tip_radius_mm=tip_radius_mm, decimals=decimals,
         outside_box=outside_box, date=date, accept=tuple(accept),
     )  # fmt: skip
-    return run(session, source, options)
+    return run(session, source, options, progress)
 
 
-def run(session: Session, results: Source, options: ResultOptions) -> ResultCorrection:
+def run(
+    session: Session, results: Source, options: ResultOptions, progress: Progress | None = None
+) -> ResultCorrection:
     """As `correct_results`, in a session."""
     real_time.refuse_correcting(session.setup.machine)
     loaded = session.loaded(options.outside_box)
@@ -133,12 +137,12 @@ def run(session: Session, results: Source, options: ResultOptions) -> ResultCorr
         profile = load_profile(profile, session.sources.read).layout
     results.load()
     with results.errors("<results>"):
-        done = _corrected(results, loaded, options, profile)
+        done = _corrected(results, loaded, options, profile, progress or silent)
     return replace(done, inputs=session.inputs())
 
 
 def _corrected(
-    results: Source, loaded: Loaded, options: ResultOptions, layout: Layout | None
+    results: Source, loaded: Loaded, options: ResultOptions, layout: Layout | None, tell: Progress
 ) -> ResultCorrection:
     data = whole(results.data)
     stamp = find_stamp(data)
@@ -149,7 +153,9 @@ def _corrected(
             line=line_of(data, stamp),
             code="OLP560",
         )
+    tell("read", 0.0)
     reported = _read(data, layout)
+    tell("correct", 0.5)
     radius = options.tip_radius_mm if options.tip_radius_mm is not None else reported.tip_radius_mm
     reported = replace(
         reported,
@@ -178,6 +184,7 @@ def _corrected(
     mark = b""
     if reported.comment is not None:
         mark = stamp_line(loaded.digest, reported.comment, accepted_of(doubts))
+    tell("write", 0.7)
     text, rounding = write(reported, result.added_mm, mark, options.decimals)
     # and so were the numbers and their places
     none = {name: getattr(reported, name)[:0].copy() for name in ("start", "end", "value")}

@@ -14,6 +14,7 @@ import numpy as np
 from olp.compensation.plan import zero_shifts
 from olp.core.arrays import Array, Index, read_only
 from olp.core.machine import Setup
+from olp.core.progress import Progress, part, silent
 from olp.core.toolpath import Toolpath
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
@@ -24,6 +25,7 @@ from olp.findings.catalogue import Finding
 from olp.program.origin import Files, Origin, original_of
 from olp.program.program import Program
 from olp.program.registry import Options
+from olp.program.text.columns import spans
 from olp.reports.report import printable
 from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted
@@ -66,15 +68,23 @@ class Simulation(Shown):
         write_bytes(path, self.to_csv(), force=force, inputs=self.inputs)
         return Path(path)
 
+    def parts(self, progress: Progress | None = None) -> Iterator[bytes]:
+        """`X_mm,Y_mm,Z_mm,line` with the frame named in a comment, in parts; `file` too where lines are of
+        several."""
+        files, count = Files(self.origin), len(self.line)
+        yield f"# frame={printable(self.frame)}\nX_mm,Y_mm,Z_mm,line{files.head}\n".encode()
+        for some in spans(count):
+            (progress or silent)("write", some.start / count)
+            points, lines = self.points_mm[some].tolist(), self.line[some].tolist()
+            rows = (
+                f"{x:.6f},{y:.6f},{z:.6f},{files.cells(n)}\n"
+                for (x, y, z), n in zip(points, lines, strict=True)
+            )
+            yield "".join(rows).encode()
+
     def to_csv(self) -> bytes:
-        """`X_mm,Y_mm,Z_mm,line` with the frame named in a comment; `file` too where lines are of several."""
-        files = Files(self.origin)
-        rows = [f"# frame={printable(self.frame)}", f"X_mm,Y_mm,Z_mm,line{files.head}"]
-        rows += [
-            f"{x:.6f},{y:.6f},{z:.6f},{files.cells(n)}"
-            for (x, y, z), n in zip(self.points_mm.tolist(), self.line.tolist(), strict=True)
-        ]
-        return ("\n".join(rows) + "\n").encode()
+        """The file as a whole."""
+        return b"".join(self.parts())
 
 
 def simulate(
@@ -89,6 +99,7 @@ def simulate(
     peck_clearance_mm: float | None = None,
     date: datetime.date | None = None,
     accept: Sequence[str] = (),
+    progress: Progress | None = None,
 ) -> Simulation:
     """The path of the tip that the uncompensated machine would take, in the program's first work frame.
 
@@ -100,21 +111,26 @@ def simulate(
         step_mm=step_mm, outside_box=outside_box, flatten=flatten,
         expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, date=date, accept=tuple(accept),
     )  # fmt: skip
-    return run(session, source, options)
+    return run(session, source, options, progress)
 
 
-def run(session: Session, program: Source, options: SimulateOptions) -> Simulation:
+def run(
+    session: Session, program: Source, options: SimulateOptions, progress: Progress | None = None
+) -> Simulation:
     """As `simulate`, in a session."""
     with program.errors("<program>"):
         loaded = session.loaded(options.outside_box).reading(program)
-    done = simulated(session.sources, program, loaded, options)
+    done = simulated(session.sources, program, loaded, options, progress or silent)
     return replace(done, inputs=session.inputs())
 
 
-def simulated(sources: Sources, program: Source, loaded: Loaded, options: SimulateOptions) -> Simulation:
+def simulated(
+    sources: Sources, program: Source, loaded: Loaded, options: SimulateOptions, tell: Progress = silent
+) -> Simulation:
     """As `simulate`, of a program whose dialect is settled in `loaded`."""
     with program.errors("<program>"):
-        reading = Options()
+        tell("read", 0.0)
+        reading = Options(tell=part(tell, 0.0, 0.5))
         program, parsed = refusals.read(
             sources, program, loaded.setup, loaded.dialect, reading, options, words=False
         )
@@ -123,7 +139,10 @@ def simulated(sources: Sources, program: Source, loaded: Loaded, options: Simula
         )
         parsed = parsed.in_original()
         path = parsed.toolpath
-        parts = list(tips(path, loaded.model, options.step_mm))
+        parts = []
+        for some in tips(path, loaded.model, options.step_mm):
+            parts.append(some)
+            tell("simulate", 0.5 + 0.5 * float(some[1][-1]) / len(path))
     if not parts:
         points_mm = np.zeros((0, 3))
         report = _report(program, parsed, loaded, options, points_mm, "", doubts)

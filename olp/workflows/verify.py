@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from olp.core.arrays import Array, read_only
 from olp.core.machine import Setup
-from olp.core.progress import Progress, silent
+from olp.core.progress import Progress, part, silent
 from olp.core.values import dataclass
 from olp.errormodel.known import KnownErrors
 from olp.files.sources import Source
@@ -103,15 +103,17 @@ def run(
     with nominal.errors():
         loaded = loaded.reading(nominal)
     read = partial(refusals.read, session.sources, setup=loaded.setup, dialect=loaded.dialect)
-    reading = Options()
     tell("read", 0.0)
     with nominal.errors("<nominal>"):
-        _, first = read(nominal, options=reading, unrolling=options, kept=True)
-    tell("read", 0.0)
+        _, first = read(nominal, options=Options(tell=part(tell, 0.0, 0.25)), unrolling=options, kept=True)
     with corrected.errors("<corrected>"):
+        reading = Options(tell=part(tell, 0.25, 0.4))
         _, second = read(corrected, options=reading, unrolling=unrolling_of_corrected(first))
     outside = "OLP403" if options.outside_box == "hold" else None
-    done = verify_programs((first, nominal.name), (second, corrected.name), loaded, options, outside=outside)
+    done = verify_programs(
+        (first, nominal.name), (second, corrected.name), loaded, options, outside=outside,
+        tell=part(tell, 0.4, 1.0),
+    )  # fmt: skip
     origin = done.nominal.origin
     report, findings = placed(done.report, origin), placed_findings(done.findings, origin)
     position_mm = read_only(done.proof.nominal.end_mm)

@@ -15,6 +15,7 @@ import numpy as np
 
 from olp.core.budget import RUN_BYTES, Budget
 from olp.core.errors import ProgramError, UsageError
+from olp.core.progress import Progress, silent
 from olp.core.values import dataclass
 from olp.program.apt.table import FREE
 from olp.program.apt.transforms import NOTHING, Rigid, rigid
@@ -50,13 +51,19 @@ class _Piece:
 
 
 def unroll(
-    data: bytes, dialect: Dialect, *, limit: int = RUN_BYTES, expand_cycles: bool = False, **_: Any
+    data: bytes,
+    dialect: Dialect,
+    *,
+    limit: int = RUN_BYTES,
+    tell: Progress = silent,
+    expand_cycles: bool = False,
+    **_: Any,
 ) -> Unrolled:
     """A program with its copies written out, and the origin of each line. Raises ProgramError with the line
     of a COPY whose range or form is not read, and UsageError where cycles are to be expanded too."""
     if expand_cycles:
         raise UsageError("cycles are made by the post-processor; leave --expand-cycles out")
-    budget = Budget.of_run(len(data), limit, _TOO_LONG)
+    budget = Budget.of_run(len(data), limit, _TOO_LONG, tell)
     pieces: list[_Piece] = []
     begins: dict[bytes, int] = {}
     copied: set[bytes] = set()

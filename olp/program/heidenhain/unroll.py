@@ -16,6 +16,7 @@ import numpy as np
 from olp.core.budget import RUN_BYTES, Budget
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
+from olp.core.progress import Progress, silent
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect
 from olp.program.heidenhain.cycles import AT_ONCE, PATTERNS
@@ -98,6 +99,7 @@ def unroll(
     parameters: Mapping[str, float] | None = None,
     limit: int = RUN_BYTES,
     setup: Setup | None = None,
+    tell: Progress = silent,
 ) -> Unrolled:
     """Plain blocks of a program, with the origin of each. Blocks with `/` are left as they are. `parameters`
     are values by names such as "Q5", `setup` has the tools of contours. Raises ProgramError with the line in
@@ -106,7 +108,7 @@ def unroll(
         raise ProgramError(
             "cycles of this dialect are not written out; leave --expand-cycles out", code="OLP544"
         )
-    run = _Run(dialect, subprograms, Radius(setup), Budget.of_run(len(data), limit))
+    run = _Run(dialect, subprograms, Radius(setup), Budget.of_run(len(data), limit, tell=tell))
     run.parameters.update({name.upper(): value for name, value in (parameters or {}).items()})
     run.stated = dict(run.parameters)
     run.visit(_Unit.of(data, "", dialect), 0, 0, main=True)

@@ -21,6 +21,7 @@ import numpy as np
 from olp.core.budget import RUN_BYTES, Budget
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
+from olp.core.progress import Progress, silent
 from olp.program.origin import Origin, Unrolled, Within
 from olp.program.rs274.block_text import CLOSED_TOGETHER
 from olp.program.rs274.codes import ABSOLUTE, INCREMENTAL, SHIFTED_BORES, SPLINES
@@ -65,6 +66,7 @@ def flatten(
     parameters: Mapping[str, float] | None = None,
     setup: Setup | None = None,
     limit: int = RUN_BYTES,
+    tell: Progress = silent,
 ) -> Unrolled:
     """Plain blocks of a program, with the origin of each; see the module for what is kept.
 
@@ -74,8 +76,9 @@ def flatten(
     G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance of G73 and G83, needed
     where a parameter of the control sets it. `parameters` are values that parameters such as "#100" have in
     the control, `setup` has the work offsets. `limit` is the work that a short program may cause, in bytes of
-    visited blocks; a long one may cause `RUN_PER_BYTE` for each of its bytes. Raises ProgramError with
-    the line in the source, or with the line in the subprogram and its file.
+    visited blocks; a long one may cause `RUN_PER_BYTE` for each of its bytes, and `tell` is told the share
+    of it. Raises ProgramError with the line in the source, or with the line in the subprogram and its
+    file.
     """
     strokes = stroke_budget(len(data))
     writer = _Flattener(
@@ -83,7 +86,7 @@ def flatten(
         setup=setup, switch_open=block_delete is None,
     )  # fmt: skip
     main = Unit(data, profile, file)
-    budget = Budget.of_run(len(data), limit)
+    budget = Budget.of_run(len(data), limit, tell=tell)
     Walk(
         main, writer.variables, subprograms, writer.block, writer.leave, budget, block_delete=block_delete
     ).run()

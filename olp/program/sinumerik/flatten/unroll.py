@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from olp.core.budget import RUN_BYTES, Budget
+from olp.core.progress import Progress, silent
 from olp.core.units import AXES
 from olp.program.origin import Origin, Unrolled
 from olp.program.sinumerik.blocks import NUMBER, Form, Piece
@@ -48,6 +49,7 @@ def flatten(
     peck_clearance: float | None = None,
     parameters: Mapping[str, float] | None = None,
     limit: int = RUN_BYTES,
+    tell: Progress = silent,
 ) -> Unrolled:
     """Plain blocks of a program, with the origin of each.
 
@@ -69,7 +71,7 @@ def flatten(
                 known[name] = None if given is None else Unit.of(given[1], given[0])
         return known[name]
 
-    budget = Budget.of_run(len(data), limit)
+    budget = Budget.of_run(len(data), limit, tell=tell)
     unit = Unit.of(main, None)
     with contextlib.suppress(Stop):
         Walk(writer.visit, writer.kept, find, budget, block_delete=block_delete).run(
