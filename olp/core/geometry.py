@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, distinct
+from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.values import dataclass
 
 Plane = npt.NDArray[np.int8] | npt.NDArray[np.int64]
@@ -86,19 +86,13 @@ class ArcShapes:
 
     def _away(self, point: Array, which: Index, near: Array, per_rad: Array) -> Array:
         """The same of some points; `per_rad` (m,) are arcs per radian."""
-        p0, p1, p2 = in_planes(point, self.plane.take(which))
-        p0, p1 = p0 - self.centre_first.take(which), p1 - self.centre_second.take(which)
-        sweep, level = self.sweep.take(which), p2 - self.level.take(which)
-        size = np.abs(sweep)
-        angle = np.arctan2(p1, p0) - self.angle.take(which)
-        # the point lies on the turn of share `near`
-        angle += _TURN * np.rint((near * sweep - angle) * (1.0 / _TURN))
-        turned = np.where(sweep < 0.0, -angle, angle)
+        reach, level, turned = self._polar(point, which, near)
+        size = np.abs(self.sweep.take(which))
         place = np.clip(turned, 0.0, size)
         beyond = _beyond(turned, place, size)
         wider = (self.wider * per_rad).take(which)
         mean = self.radius.take(which) + wider * place
-        across = np.sqrt(p0 * p0 + p1 * p1) - mean
+        across = reach - mean
         along = beyond * mean
         rising = np.flatnonzero(self.rise.take(which))
         if rising.size:
@@ -114,6 +108,45 @@ class ArcShapes:
             along[rising] = (here + beyond[rising] - nearest) * radius
             level[rising] -= nearest * lead
         return np.asarray(np.sqrt(across * across + along * along + level * level), float)
+
+    def across(self, point: Array, which: Index, near: Array) -> tuple[Array, Array, Mask]:
+        """(n,) how far points as in `distance` are off in the two directions across arcs that go on beyond
+        their ends: away from the axis, and along it. Then (n,) whether they lie beyond an end."""
+        columns = np.empty(len(point)), np.empty(len(point)), np.empty(len(point), bool)
+        per_rad = 1.0 / np.abs(self.sweep)
+        for a in range(0, len(point), _POINTS):
+            part = slice(a, a + _POINTS)
+            for column, some in zip(
+                columns, self._across(point[part], which[part], near[part], per_rad), strict=True
+            ):
+                column[part] = some
+        return columns
+
+    def _across(self, point: Array, which: Index, near: Array, per_rad: Array) -> tuple[Array, Array, Mask]:
+        """The same of some points."""
+        radial, level, place = self._polar(point, which, near)
+        mean = self.radius.take(which) + (self.wider * per_rad).take(which) * place
+        radial -= mean
+        rising = np.flatnonzero(self.rise.take(which))
+        if rising.size:
+            of = which[rising]
+            lead, radius = self.rise[of] * per_rad[of], mean[rising]
+            over = level[rising] - place[rising] * lead
+            square = np.maximum(radius**2 + lead**2, 1e-24)
+            place[rising] += over * lead / square
+            level[rising] = over * radius / np.sqrt(square)
+        return radial, level, (place < 0.0) | (place > np.abs(self.sweep.take(which)))
+
+    def _polar(self, point: Array, which: Index, near: Array) -> tuple[Array, Array, Array]:
+        """(n,) distances of points from the axes of arcs, positions along these from the start, and angles
+        from the start in the direction of the sweep, which lie on the turn of share `near`."""
+        p0, p1, p2 = in_planes(point, self.plane.take(which))
+        p0, p1 = p0 - self.centre_first.take(which), p1 - self.centre_second.take(which)
+        sweep = self.sweep.take(which)
+        angle = np.arctan2(p1, p0) - self.angle.take(which)
+        angle += _TURN * np.rint((near * sweep - angle) * (1.0 / _TURN))
+        reach = np.sqrt(p0 * p0 + p1 * p1)
+        return reach, p2 - self.level.take(which), np.where(sweep < 0.0, -angle, angle)
 
 
 def _beyond(turned: Array, place: Array, size: Array) -> Array:

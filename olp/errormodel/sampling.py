@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, distinct_rows
+from olp.core.arrays import Array, Index, distinct_rows
 from olp.errormodel.base import ErrorModel
 
 #: Steps of one move, at most.
@@ -37,11 +37,11 @@ def steps_needed(
     tool_mm: Array,
     bend_mm: float,
     *,
-    at_least: int = 1,
+    at_least: int | Index = 1,
     at_most: int = MOST_STEPS,
 ) -> npt.NDArray[np.int64]:
     """(n,) equal steps of each straight move by `delta_mm` (n, 3) such that the error bends by less than
-    `bend_mm` within one; `at_least` times a power of two."""
+    `bend_mm` within one; `at_least`, which may be (n,), times a power of two."""
     count = np.full(len(delta_mm), at_least, np.int64)
     todo = np.arange(len(delta_mm))
     while todo.size:

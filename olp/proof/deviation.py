@@ -7,7 +7,8 @@ the program belong to which nominal move.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy.typing as npt
 
 from olp.compensation.plan import TargetRows
 from olp.core.arrays import Array, Index, Mask, all_in_row, any_in_row
-from olp.core.geometry import ArcShapes, arms, segment_distance
+from olp.core.geometry import ArcShapes, arms, put_in_planes, segment_distance
 from olp.core.progress import Progress, silent
 from olp.core.spool import unload
 from olp.core.toolpath import Flag, Kind, Toolpath
@@ -24,6 +25,7 @@ from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import play_after, play_interval, taken_up
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 from olp.program.text.columns import apart, spans
+from olp.proof.courses import Courses, arc_index, peaks
 from olp.proof.smooth_joints import SmoothJoints
 from olp.proof.unknown_sides import UnknownSides
 from olp.proof.unknown_starts import UnknownStarts
@@ -35,12 +37,16 @@ Single = npt.NDArray[np.float32]
 _BLOCK = 1 << 15
 #: ... where they would have more samples
 _SAMPLES = 1 << 16
-#: samples of an arc move at the least, and of a move at the most
-_ARC_STEPS = 8
+#: steps of a move at the most
 _MOST_STEPS = 1 << 12
-#: rad between samples of an arc at most. What is off in one direction counts across the arc, and the largest
-#: of it is then missed by 0.12 %.
-_ARC_ANGLE_RAD = 0.1
+#: Steps of an arc at the least, and rad of each at the most. What is off in one direction counts across the
+#: arc as a sine, and what the error grows with the position as a sine of twice the angle: `peaks` finds the
+#: largest between the samples.
+_ARC_STEPS = 4
+_ARC_ANGLE_RAD = 0.3
+#: The same where the samples themselves are compared: the largest is then missed by 0.12 %.
+_SAMPLED_STEPS = 8
+_SAMPLED_ANGLE_RAD = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,7 +159,7 @@ class Tracer:
             parts.extend((some.start + np.flatnonzero(begins)).tolist())
             samples = int(ends[-1])
         for a, b in pairwise((*parts, len(path))):
-            start, end, arc = path.starts_mm(a, b), path.end_mm[a:b], _arc_index(path, a, b)
+            start, end, arc = path.starts_mm(a, b), path.end_mm[a:b], arc_index(path, a, b)
             point, part, _ = tracer.points(start, end, arc, steps[a:b])
             tool = path.tool_mm(a, b)
             yield tracer.actual(point, tool if tool.ndim == 1 else tool[part]), part + a
@@ -208,7 +214,7 @@ class Tracer:
         delta = np.where(np.isnan(end), 0.0, end - start)
         steps = np.ones(len(end), np.int64)
         known = np.asarray(all_in_row(np.isfinite(delta)))
-        arc = _arc_index(path, first, last)
+        arc = arc_index(path, first, last)
         cut = known & (path.kind[first:last] != Kind.RAPID)
         if self.elsewhere is not None:
             cut &= ~self.elsewhere[a:b][owner]
@@ -220,8 +226,13 @@ class Tracer:
                 at_most=_MOST_STEPS,
             )  # fmt: skip
         curved = np.flatnonzero((arc >= 0) & known)
+        courses = cache(lambda: Courses.of(self.nominal, self.target, a, b, self._known))
+        smooth = np.zeros(len(end), bool)
         if curved.size:
-            steps[curved] = self._arc_steps(arc[curved], start[curved], delta[curved], tool, curved)
+            smooth[curved] = (courses().arc[owner[curved]] >= 0) & (not self.has_play)
+            steps[curved] = self._arc_steps(
+                arc[curved], start[curved], delta[curved], tool, curved, smooth[curved]
+            )
         reached, inner = self._samples(start, end, arc, steps, known, tool, path.kind[first:last])
         # ends of parts inside a nominal move lie along it, too
         inside = np.ones(len(end), bool)
@@ -230,11 +241,21 @@ class Tracer:
         tips = np.concatenate((self.before[None], reached))
         self._ends(a, b, tips, ends, waypoint)
         worst[:] = waypoint
+        samples = len(inner.part)
+        near = _Nearness(owner, path, first)
+        if smooth.any():
+            rows = np.flatnonzero(smooth)
+            begin = tips.take(rows, axis=0) if tool.ndim == 1 else self.actual(start[rows], tool[rows])
+            on_arcs = smooth[inner.part]
+            beyond = self._curves(
+                a, owner, rows, begin, tips, inner.pick(on_arcs), steps, courses(), near, worst
+            )
+            inner = inner.pick(~on_arcs).with_more(beyond)
         if len(inner.part) or len(cuts):
             self._bend(a, tips, inner, owner, arc >= 0, bend)
-            self._along(a, b, first, owner, inner.with_ends(cuts, reached), worst)
-        self._starts(a, b, first, owner, tips, waypoint, worst)
-        return len(end) + len(inner.part)
+            self._along(a, owner, inner.with_ends(cuts, reached), courses(), near, worst)
+        self._starts(a, b, owner, tips, waypoint, courses, near, worst)
+        return len(end) + samples
 
     def _ends(self, a: int, b: int, tips: Array, ends: Index, waypoint: Single) -> None:
         """How far the tip is off at the ends of nominal moves a..b, behind `ends` of the moves that reach
@@ -326,35 +347,42 @@ class Tracer:
         return np.asarray((start + self.model.error(start, tool))[0])
 
     def _starts(
-        self, a: int, b: int, first: int, owner: Index, tips: Array, waypoint: Single, worst: Single
-    ) -> None:
+        self, a: int, b: int, owner: Index, tips: Array, waypoint: Single, courses: Callable[[], Courses],
+        near: _Nearness, worst: Single,
+    ) -> None:  # fmt: skip
         """A cut starts where the moves before it ended, which may be farther off than any of its samples."""
         away = np.concatenate(([self.away], waypoint[:-1]))
         self.before, self.away = tips[-1], waypoint[-1]
         farther = np.where(np.isnan(away), np.inf, away) > worst
         farther &= self.nominal.kind[a:b] != Kind.RAPID
         rows = np.flatnonzero(farther)
-        begin = np.concatenate(([0], self.groups[a : b - 1] + 1 - first))[rows]
+        begin = np.concatenate(([0], self.groups[a : b - 1] + 1 - near.first))[rows]
         tip = tips.take(begin, axis=0)
         some = (begin < len(tips) - 1) & all_in_row(np.isfinite(self._known(a + rows, tip)))
         rows, begin, tip = rows[some], begin[some], tip[some]
         some = owner[begin] == rows
         if some.any():
             starts = _Inner(begin[some], np.zeros(int(some.sum())), tip[some])
-            self._along(a, b, first, owner, starts, worst)
+            self._along(a, owner, starts, courses(), near, worst)
 
-    def _arc_steps(self, arc: Index, start: Array, delta: Array, tool: Array, rows: Index) -> Index:
-        """Steps of the moves `rows`, which are arcs."""
+    def _arc_steps(
+        self, arc: Index, start: Array, delta: Array, tool: Array, rows: Index, smooth: Mask
+    ) -> Index:
+        """Steps of the moves `rows`, which are arcs; those of some are samples of a `smooth` curve."""
         arcs = self.path.arcs
-        radius = np.sqrt(np.nansum((start - arcs.centre_mm[arc]) ** 2, axis=1))
+        centre, plane = arcs.centre_mm[arc], arcs.plane[arc]
         sweep = np.abs(arcs.sweep_rad[arc])
-        # no axis moves farther than the arc is long and wide, or than the helix rises
-        reach = np.maximum(np.minimum(radius * sweep, 2 * radius)[:, None], np.abs(delta))
+        length = sweep * np.hypot(*arms(start, centre, plane))
+        # no axis of its plane moves farther than the arc is long, and the third one as the helix rises
+        reach = np.abs(delta)
+        put_in_planes(reach, plane, length, length)
+        angle = np.where(smooth, _ARC_ANGLE_RAD, _SAMPLED_ANGLE_RAD)
+        wide = np.ceil(sweep / angle).astype(np.int64)
         needed = steps_needed(
-            self.model, reach, tool if tool.ndim == 1 else tool[rows], self.bend, at_least=_ARC_STEPS,
-            at_most=_MOST_STEPS,
+            self.model, reach, tool if tool.ndim == 1 else tool[rows], self.bend,
+            at_least=np.where(smooth, np.maximum(wide, _ARC_STEPS), _SAMPLED_STEPS), at_most=_MOST_STEPS,
         )  # fmt: skip
-        return np.maximum(needed, np.ceil(sweep / _ARC_ANGLE_RAD).astype(np.int64))
+        return np.maximum(needed, wide)
 
     def actual(self, point: Array, tool: Array) -> Array:
         """Where the tip really is; keeps the play of the axes from call to call."""
@@ -373,55 +401,44 @@ class Tracer:
         """(m, 3) points without the axes that are unknown at the ends of their nominal moves (m,)."""
         return point if self.blind is None else np.where(self.blind[move], 0.0, point)
 
-    def _along(self, a: int, b: int, first: int, owner: Index, inner: _Inner, worst: Single) -> None:
+    def _along(
+        self, a: int, owner: Index, inner: _Inner, courses: Courses, near: _Nearness, worst: Single
+    ) -> None:
         """Distances of samples from their nominal move, the largest per move."""
-        nominal = self.nominal
-        goal = self.target[a:b]
-        begin = np.zeros_like(goal)
-        begin[1:] = goal[:-1]
-        begin[0] = self.target[a - 1] if a else np.array(nominal.start_mm)
         of = owner[inner.part]
         actual = self._known(a + of, inner.actual)
-        arc = _arc_index(nominal, a, b)
-        rows = np.flatnonzero(arc >= 0)
-        straight, curved, which = _kinds(arc >= 0, of)
-        line = of[straight]
-        distance = np.empty(len(of))
-        every = a + np.arange(b - a)
-        ways = self._known(every, begin), self._known(every, goal)
-        if straight.size:
-            some = actual.take(straight, axis=0) if curved.size else actual
-            distance[straight] = segment_distance(some, *ways, line)
-        if curved.size:
-            arcs, move = nominal.arcs, a + rows
-            shift = goal[rows] - nominal.end_mm[move]
-            shapes = ArcShapes.of(
-                self._known(move, nominal.starts_mm(a, b)[rows] + shift), self._known(move, goal[rows]),
-                self._known(move, arcs.centre_mm[arc[rows]] + shift), arcs.plane[arc[rows]],
-                arcs.sweep_rad[arc[rows]],
-            )  # fmt: skip
-            near = self._near(owner, first, inner.part[curved], inner.share[curved], of[curved])
-            distance[curved] = shapes.distance(actual.take(curved, axis=0), which, near)
+        distance = courses.distance(
+            actual, of, lambda rows: near.share(inner.part[rows], inner.share[rows], of[rows])
+        )
         if self.joints is not None:
-            self.joints.put_across(distance, a + of, actual - self._known(a + of, goal[of]))
-            self.joints.put_across(distance, a + of - 1, actual - self._known(a + of, begin[of]))
+            self.joints.put_across(distance, a + of, actual - courses.goal[of])
+            self.joints.put_across(distance, a + of - 1, actual - courses.begin[of])
         # of one kind with the column: else numpy takes ten times as long
         np.fmax.at(worst, of, distance.astype(np.float32))
 
-    def _near(self, owner: Index, first: int, part: Index, share: Array, of: Index) -> Array:
-        """Roughly where on its nominal arc each sample lies: by the angles of the arcs that it became."""
-        if (owner == np.arange(len(owner))).all():
-            # each move became one
-            return share
-        arcs = self.path.arcs.within(first, first + len(owner))
-        size, row = np.abs(self.path.arcs.sweep_rad[arcs]), self.path.arcs.move[arcs] - first
-        turn = np.zeros(len(owner))
-        turn[row] = size
-        before = np.cumsum(turn) - turn
-        total = np.bincount(owner[row], size, minlength=int(owner[-1]) + 1)
-        begin = np.cumsum(total) - total
-        place = before[part] - begin[of] + share * turn[part]
-        return np.asarray(place / np.maximum(total[of], 1e-12))
+    def _curves(
+        self, a: int, owner: Index, rows: Index, begin: Array, tips: Array, inner: _Inner, steps: Index,
+        courses: Courses, near: _Nearness, worst: Single,
+    ) -> _Inner:  # fmt: skip
+        """How far arcs `rows` leave their nominal arcs, the largest per move, from equal steps: the samples
+        `inner`, and the tip where they `begin` and end. Returns those that lie beyond the ends of their
+        nominal arc, where more counts than what is across it."""
+        count = steps[rows] + 1
+        tail = np.cumsum(count) - 1
+        head = tail - count + 1
+        within = np.ones(int(count.sum()), bool)
+        within[head] = within[tail] = False
+        within = np.flatnonzero(within)
+        point, share = np.empty((int(count.sum()), 3)), np.zeros(int(count.sum()))
+        point[head], point[within], point[tail] = begin, inner.actual, tips.take(rows + 1, axis=0)
+        share[within], share[tail] = inner.share, 1.0
+        part = np.repeat(rows, count)
+        of = owner[part]
+        radial, level, beyond = courses.shapes.across(
+            self._known(a + of, point), courses.arc[of], near.share(part, share, of)
+        )
+        np.fmax.at(worst, owner[rows], peaks((radial, level), count).astype(np.float32))
+        return inner.pick(beyond[within])
 
     def _bend(self, a: int, tips: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single) -> None:
         """How far the samples of straight parts leave the chord between the actual ends of their part, which
@@ -447,6 +464,11 @@ class _Inner:
     share: Array
     actual: Array
 
+    def pick(self, which: Mask) -> _Inner:
+        """Some of them."""
+        rows = np.flatnonzero(which)
+        return _Inner(self.part.take(rows), self.share.take(rows), self.actual.take(rows, axis=0))
+
     def with_more(self, other: _Inner) -> _Inner:
         """These and others."""
         return _Inner(
@@ -458,6 +480,31 @@ class _Inner:
     def with_ends(self, cuts: Index, reached: Array) -> _Inner:
         """These, and the ends of the parts `cuts`."""
         return self.with_more(_Inner(cuts, np.ones(len(cuts)), reached[cuts]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Nearness:
+    """Moves from `first` of a path, and (m,) the `owner` of each among nominal moves."""
+
+    owner: Index
+    path: Toolpath
+    first: int
+
+    def share(self, part: Index, share: Array, of: Index) -> Array:
+        """Roughly where on its nominal arc each sample lies: by the angles of the arcs that it became."""
+        owner = self.owner
+        if (owner == np.arange(len(owner))).all():
+            # each move became one
+            return share
+        arcs = self.path.arcs.within(self.first, self.first + len(owner))
+        size, row = np.abs(self.path.arcs.sweep_rad[arcs]), self.path.arcs.move[arcs] - self.first
+        turn = np.zeros(len(owner))
+        turn[row] = size
+        before = np.cumsum(turn) - turn
+        total = np.bincount(owner[row], size, minlength=int(owner[-1]) + 1)
+        begin = np.cumsum(total) - total
+        place = before[part] - begin[of] + share * turn[part]
+        return np.asarray(place / np.maximum(total[of], 1e-12))
 
 
 def owner_of(groups: Index, first: int, last: int) -> Index:
@@ -494,14 +541,6 @@ def _equal_steps(path: Toolpath, step_mm: float) -> Index:
         radius = np.sqrt(np.nansum((start[arcs.move] - arcs.centre_mm) ** 2, axis=1))
         length[arcs.move] = np.maximum(length[arcs.move], radius * np.abs(arcs.sweep_rad))
     return np.asarray(np.maximum(np.ceil(length / step_mm), 1), np.int64)
-
-
-def _arc_index(path: Toolpath, first: int, last: int) -> Index:
-    """(m,) index into the arcs of each of moves `first`..`last`, -1 where it is none."""
-    index = np.full(last - first, -1, np.int64)
-    some = path.arcs.within(first, last)
-    index[path.arcs.move[some] - first] = np.arange(some.start, some.stop)
-    return index
 
 
 def _between(start: Array, end: Array, part: Index, share: Array) -> Array:

@@ -508,16 +508,22 @@ def sampled(path: Toolpath, model: Known) -> Array:
     return np.concatenate([points for points, _ in model.asked])
 
 
-@pytest.mark.parametrize(("sweep", "count"), [(0.3, 8), (0.81, 16), (-1.7, 32), (3.1, 32), (-6.2, 64)])
-def test_samples_of_an_arc_are_a_tenth_of_a_radian_apart(sweep: float, count: int) -> None:
-    """Eight at least, and twice as many until they are that near."""
+@pytest.mark.parametrize(
+    ("sweep", "count", "played"),
+    [(0.3, 4, 8), (0.81, 4, 9), (-1.7, 6, 17), (3.1, 11, 31), (-6.2, 21, 62)],
+)
+@pytest.mark.parametrize("play", (0.0, 0.01))
+def test_how_near_the_samples_of_an_arc_are(sweep: float, count: int, played: int, play: float) -> None:
+    """0.3 rad where a curve goes through them, four at least; 0.1 rad and eight with backlash."""
     end = (10 * math.cos(sweep), 10 * math.sin(sweep), 0.0)
     path = toolpath(rapid(10, 0, 0), arc(*end, centre=(0, 0, 0), sweep=sweep), start=(10, 0, 0))
-    points = sampled(path, Known())
+    points = sampled(path, Known(backlash_mm=(0.0, 0.0, play)))
     angle = np.unique(np.round(np.mod(np.arctan2(points[:, 1], points[:, 0]) * np.sign(sweep), 2 * np.pi), 9))
-    assert len(angle) - 1 >= abs(sweep) / 0.1
-    assert np.diff(angle).max() < 0.1 + 1e-9
-    assert len(angle) - 1 <= count
+    steps = played if play else count
+    equal = np.linspace(0, abs(sweep), steps + 1)
+    assert np.abs(angle[:, None] - equal).min(axis=0) == pytest.approx(0, abs=1e-8)
+    # and where an axis turns round
+    assert len(angle) - len(equal) == (int(abs(sweep) / (math.pi / 2)) if play else 0)
 
 
 @pytest.mark.parametrize(
@@ -540,16 +546,17 @@ def test_a_line_is_halved_until_it_bends_no_more_than_that(length: float, count:
 @pytest.mark.parametrize(
     ("end", "sweep", "count"),
     [
-        ((16, 0, 0), math.pi, 32),
-        ((16, 0, 32), math.pi, 64),
-        ((0, 0, 0), 2 * math.pi, 63),
-        ((8, -8, 0), math.pi / 2, 32),
+        ((16, 0, 0), math.pi, 44),
+        ((16, 0, 32), math.pi, 88),
+        ((0, 0, 0), 2 * math.pi, 84),
+        ((8, -8, 0), math.pi / 2, 24),
     ],
 )
 def test_an_arc_is_halved_until_it_bends_no_more_than_that(
     end: tuple[float, ...], sweep: float, count: int
 ) -> None:
-    """As if each axis moved as far as the arc is wide, which is 16 mm here, or as the helix rises."""
+    """As if each axis of the plane moved as far as the arc is long, 25 mm for half a turn here, and the third
+    one as the helix rises."""
     path = toolpath(rapid(0, 0, 0), arc(*end, centre=(8, 0, 0), sweep=sweep))
     points = sampled(path, Known(curvature=9e-4))
     assert len(np.unique(np.round(points, 7), axis=0)) - (end != (0, 0, 0)) == count
