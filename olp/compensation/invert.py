@@ -74,11 +74,20 @@ def _largest(vectors: Array) -> Array:
 
 
 def bent(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
-    """Commands for samples between waypoints: one step of the iteration where the error is small (then it is
-    right to a few nanometres), two elsewhere; whatever the samples beside it are."""
+    """Commands for samples between waypoints, as they lie: targets less `lag`."""
+    return np.asarray(target_mm - lag(model, target_mm, tool_mm, play), float)
+
+
+def lag(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
+    """(n, 3) how far commands for samples between waypoints lie behind the targets: one step of the iteration
+    where the error is small (then it is right to a few nanometres), two elsewhere; whatever the samples
+    beside it are."""
     error = model.error(target_mm, tool_mm, play)
+    # mostly all are small, and NaN is not
+    if np.max(error, initial=0.0) <= _SMALL_MM and np.min(error, initial=0.0) >= -_SMALL_MM:
+        return error
     some = np.flatnonzero(_largest(error) > _SMALL_MM)
     if some.size:
         tool = tool_mm if tool_mm.ndim == 1 else tool_mm[some]
         error[some] = model.error((target_mm - error)[some], tool, None if play is None else play[some])
-    return np.asarray(target_mm - error, float)
+    return error

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.compensation.invert import bent
+from olp.compensation.invert import BLOCK, lag
 from olp.core.arrays import Array, Index, Mask, all_in_row, distinct
 from olp.core.toolpath import Toolpath
 from olp.errormodel.base import ErrorModel
@@ -120,24 +120,27 @@ def _across(model: ErrorModel, start: Array, delta: Array, tool: Array, steps: i
     samples of one line after the other."""
     samples = steps + 1
     share = np.arange(samples) / steps
-    shape = len(delta), samples
-    path = np.empty((*shape, 3))
-    for axis in range(3):
-        column = delta[:, axis, None] * share
-        column += start[:, axis, None]
-        path[..., axis] = column
-    point = path.reshape(-1, 3)
-    tools = tool if tool.ndim == 1 else np.repeat(tool, samples, axis=0)
-    play = None
-    if model.backlash_at(point[:1]) is not None:
-        play = np.repeat(np.sign(delta), samples, axis=0)
-    departure = point - bent(model, point, tools, play)
-    across = np.zeros((2, *shape))
+    across = np.zeros((2, len(delta), samples))
     sides = _sides(delta)
-    for axis in range(3):
-        away = departure[:, axis].copy().reshape(shape)
-        for column, side in zip(across, sides, strict=True):
-            column += away * side[:, axis, None]
+    # so many lines that their samples stay in the cache
+    size = max(BLOCK // samples, 1)
+    for a in range(0, len(delta), size):
+        some = slice(a, a + size)
+        shape = len(delta[some]), samples
+        path = np.empty((3, *shape))
+        for column, begin, course in zip(path, start[some].T, delta[some].T, strict=True):
+            np.multiply(course[:, None], share, out=column)
+            column += begin[:, None]
+        point = path.reshape(3, -1).T
+        tools = tool if tool.ndim == 1 else np.repeat(tool[some], samples, axis=0)
+        play = None
+        if model.backlash_at(point[:1]) is not None:
+            play = np.repeat(np.sign(delta[some]), samples, axis=0)
+        departure = lag(model, point, tools, play)
+        for axis in range(3):
+            away = departure[:, axis].reshape(shape)
+            for column, side in zip(across[:, some], sides, strict=True):
+                column += away * side[some, axis, None]
     return across.reshape(2, -1)
 
 

@@ -46,7 +46,8 @@ class RigidBody(Boxed):
         points = as_points(axis_mm)
         tool = as_tool(tool_mm, len(points))
         states = None if play is None else as_points(play, "play")
-        result = np.zeros(points.shape)
+        # column by column where the points lie so
+        result = np.zeros_like(points)
         for start in range(0, len(points), BLOCK):
             part = slice(start, start + BLOCK)
             position, unknown = self._positions(points[part])
@@ -232,37 +233,38 @@ def _first_order(six: Six, lever_arms: list[tuple[tuple[int, ...], list[Column]]
 
 
 def _sine(angle: Column, terms: int) -> tuple[Column, Column]:
-    """sin(angle) and tan(angle / 2): by series of so many terms, which the body chose, or exactly (0)."""
+    """sin(angle) and -tan(angle / 2): by series of so many terms, which the body chose, or exactly (0)."""
     if terms == 0:
-        return np.sin(angle), np.tan(0.5 * angle)
+        return np.sin(angle), np.tan(-0.5 * angle)
     if terms == 2:
         third = angle * angle
         third *= angle
         third *= 1.0 / 6.0
         angle = angle - third
-    return angle, 0.5 * angle
+    return angle, -0.5 * angle
 
 
 def _rotate(angles: list[tuple[int, Column, Column]], arm: list[Column]) -> Three:
-    """(S - I) arm for the turns (axis, sin, tan of half) in their order, as exact plane rotations. The
+    """(S - I) arm for the turns (axis, sin, -tan of half) in their order, as exact plane rotations. The
     columns of `arm` are changed."""
     moved: Three = [None, None, None]
     for turn, (a, sine, half) in enumerate(angles, 1):
         p, q = _PLANES[a]
-        back = half * arm[p]
-        back += arm[q]
-        back *= sine
-        aside = half * arm[q]
-        aside -= arm[p]
+        aside = half * arm[p]
+        aside -= arm[q]
         aside *= sine
-        for i, less in ((p, back), (q, aside)):
-            if turn < len(angles):
-                arm[i] -= less
+        back = half * arm[q]
+        back += arm[p]
+        back *= sine
+        needed = {i for later, _, _ in angles[turn:] for i in _PLANES[later]}
+        for i, more in ((p, aside), (q, back)):
+            if i in needed:
+                arm[i] += more
             done = moved[i]
             if done is None:
-                moved[i] = -less
+                moved[i] = more
             else:
-                done -= less
+                done += more
                 moved[i] = done
     return moved
 
