@@ -206,33 +206,52 @@ def quarter_shares(start: Array, centre: Array, plane: Plane, sweep: Array, quar
     return np.where(share <= 1.0, share, np.nan)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Segments:
+    """(m,) segments by columns, so that distances of many points from each are cheap: where they `begin`, how
+    far they go `along` each axis, and the `inverse` of the square of their length, 0 of one without length or
+    to an unknown end."""
+
+    begin: list[Array]
+    along: list[Array]
+    inverse: Array
+
+    @staticmethod
+    def of(start: Array, end: Array) -> Segments:
+        """Segments from `start` (m, 3) to `end`, or in the plane from (m, 2)."""
+        begin, along = (list(np.ascontiguousarray(rows.T)) for rows in (start, end - start))
+        square = np.zeros(len(start))
+        for column in along:
+            square += column * column
+        return Segments(begin, along, np.divide(1.0, square, out=np.zeros_like(square), where=square > 0))
+
+    def distance(self, point: Array, which: Index | None = None) -> Array:
+        """(n,) distances of points (n, 3) from segments, or from those `which` (n,)."""
+        distance = np.empty(len(point))
+        for a in range(0, len(point), _POINTS):
+            part = slice(a, a + _POINTS)
+            of = part if which is None else which[part]
+            away = [point[part, axis] - column[of] for axis, column in enumerate(self.begin)]
+            way = [column[part].copy() if which is None else column[of] for column in self.along]
+            share = np.zeros(len(away[0]))
+            for there, ahead in zip(away, way, strict=True):
+                share += there * ahead
+            share *= self.inverse[of]
+            np.clip(share, 0.0, 1.0, out=share)
+            square = np.zeros(len(share))
+            for there, ahead in zip(away, way, strict=True):
+                ahead *= share
+                there -= ahead
+                there *= there
+                square += there
+            np.sqrt(square, out=distance[part])
+        return distance
+
+
 def segment_distance(point: Array, start: Array, end: Array, which: Index | None = None) -> Array:
     """(n,) distances of points from segments, or from those `which` (n,), in the plane or in space; a segment
     without length is a point."""
-    begin, along = (list(np.ascontiguousarray(rows.T)) for rows in (start, end - start))
-    length2 = np.zeros(len(start))
-    for column in along:
-        length2 += column * column
-    # no way along one without length, or to an unknown end
-    inverse = np.divide(1.0, length2, out=np.zeros_like(length2), where=length2 > 0)
-    distance = np.empty(len(point))
-    for a in range(0, len(point), _POINTS):
-        part = slice(a, a + _POINTS)
-        of = part if which is None else which[part]
-        away = [point[part, axis] - column[of] for axis, column in enumerate(begin)]
-        way = [column[of] for column in along]
-        share = np.zeros(len(away[0]))
-        for there, ahead in zip(away, way, strict=True):
-            share += there * ahead
-        share *= inverse[of]
-        np.clip(share, 0.0, 1.0, out=share)
-        square = np.zeros(len(share))
-        for there, ahead in zip(away, way, strict=True):
-            there -= share * ahead
-            there *= there
-            square += there
-        np.sqrt(square, out=distance[part])
-    return distance
+    return Segments.of(start, end).distance(point, which)
 
 
 def arc_directions(

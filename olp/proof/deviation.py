@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from olp.compensation.plan import TargetRows
 from olp.core.arrays import Array, Index, Mask, all_in_row, any_in_row
-from olp.core.geometry import ArcShapes, arms, put_in_planes, segment_distance
+from olp.core.geometry import ArcShapes, Segments, arms, put_in_planes
 from olp.core.progress import Progress, silent
 from olp.core.spool import unload
 from olp.core.toolpath import Flag, Kind, Toolpath
@@ -26,6 +26,7 @@ from olp.errormodel.reversal import play_after, play_interval, taken_up
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 from olp.program.text.columns import apart, spans
 from olp.proof.courses import Courses, arc_index, peaks
+from olp.proof.samples import Nearness, Samples, between, equal_steps, kinds, runs, shares_inside
 from olp.proof.smooth_joints import SmoothJoints
 from olp.proof.unknown_sides import UnknownSides
 from olp.proof.unknown_starts import UnknownStarts
@@ -72,14 +73,15 @@ def cutting_moves(path: Toolpath) -> Mask:
 
 
 def measure(
-    nominal: Toolpath, target_mm: TargetRows, path: Toolpath, groups: Index, counted: Mask, model: ErrorModel,
-    bend_mm: float, tell: Progress = silent, *, elsewhere: Mask | None = None,
+    nominal: Toolpath, target_mm: TargetRows, path: Toolpath, groups: Index, counted: Mask | None,
+    model: ErrorModel, bend_mm: float, tell: Progress = silent, *, elsewhere: Mask | None = None,
 ) -> Deviation:  # fmt: skip
     """Compare the actual path of `path` with the nominal one. Nominal moves (n,) that something else judges
     `elsewhere` along their way are compared where the moves end that they became, and not between.
 
     `target_mm` (n, 3) are the nominal waypoints where the part really lies; `groups` (n,) is the index of
-    the last move of `path` that belongs to each nominal move. (n,) `counted` are those whose chords count.
+    the last move of `path` that belongs to each nominal move. (n,) `counted` are those whose chords count,
+    None where the bend is not asked for, which is 0 then.
     """
     count = len(nominal)
     waypoint, worst = (apart((count,), np.float32) for _ in range(2))
@@ -94,10 +96,11 @@ def measure(
     while a < count:
         parts = int(groups[a - 1]) + size if a else size
         b = min(max(int(np.searchsorted(groups, parts)), a + 1), a + size, count)
-        bend = np.zeros(b - a, np.float32)
+        bend = None if counted is None else np.zeros(b - a, np.float32)
         samples = tracer.block(a, b, waypoint[a:b], worst[a:b], bend)
         size = min(max((b - a) * _SAMPLES // max(samples, 1), least), _BLOCK)
-        largest = max(largest, float(bend.max(initial=0.0, where=counted[a:b])))
+        if counted is not None and bend is not None:
+            largest = max(largest, float(bend.max(initial=0.0, where=counted[a:b])))
         starts.block(a, b, worst[a:b])
         if sides is not None:
             side[a:b] = sides.of(int(groups[a - 1]) + 1 if a else 0, groups[a:b])
@@ -152,7 +155,7 @@ class Tracer:
         steps, samples = apart((len(path),), np.int64), 0
         parts: list[int] = []
         for some in spans(len(path)):
-            steps[some] = _equal_steps(path.part(some.start, some.stop), step_mm)
+            steps[some] = equal_steps(path.part(some.start, some.stop), step_mm)
             # every part has the moves whose last sample is in the next _BLOCK ones
             ends = samples + np.cumsum(steps[some])
             begins = np.diff(ends // _BLOCK, prepend=samples // _BLOCK if parts else -1)
@@ -198,8 +201,8 @@ class Tracer:
         within = (share > 0.0) & (share < 1.0)
         return rows[of[within]], share[within]
 
-    def block(self, a: int, b: int, waypoint: Single, worst: Single, bend: Single) -> int:
-        """Fill the columns of nominal moves a..b. Returns the number of samples."""
+    def block(self, a: int, b: int, waypoint: Single, worst: Single, bend: Single | None) -> int:
+        """Fill the columns of nominal moves a..b. Returns the number of samples that were held at once."""
         first = int(self.groups[a - 1]) + 1 if a else 0
         last = int(self.groups[b - 1]) + 1
         ends = self.groups[a:b] - first
@@ -233,7 +236,11 @@ class Tracer:
             steps[curved] = self._arc_steps(
                 arc[curved], start[curved], delta[curved], tool, curved, smooth[curved]
             )
-        reached, inner = self._samples(start, end, arc, steps, known, tool, path.kind[first:last])
+        inner = None
+        if self.has_play:
+            reached, inner = self._in_order(start, end, arc, steps, known, tool, path.kind[first:last])
+        else:
+            reached = self.actual(end, tool)
         # ends of parts inside a nominal move lie along it, too
         inside = np.ones(len(end), bool)
         inside[ends[ends >= 0]] = False
@@ -241,21 +248,22 @@ class Tracer:
         tips = np.concatenate((self.before[None], reached))
         self._ends(a, b, tips, ends, waypoint)
         worst[:] = waypoint
-        samples = len(inner.part)
-        near = _Nearness(owner, path, first)
-        if smooth.any():
-            rows = np.flatnonzero(smooth)
-            begin = tips.take(rows, axis=0) if tool.ndim == 1 else self.actual(start[rows], tool[rows])
-            on_arcs = smooth[inner.part]
-            beyond = self._curves(
-                a, owner, rows, begin, tips, inner.pick(on_arcs), steps, courses(), near, worst
-            )
-            inner = inner.pick(~on_arcs).with_more(beyond)
-        if len(inner.part) or len(cuts):
-            self._bend(a, tips, inner, owner, arc >= 0, bend)
-            self._along(a, owner, inner.with_ends(cuts, reached), courses(), near, worst)
+        near = Nearness(owner, path, first)
+        chords = cache(lambda: self._chords(a, owner, tips))
+        parts = [inner] if inner is not None else self._between_ends(start, end, arc, smooth, steps, tool)
+        for some in parts:
+            if bend is not None:
+                self._bend(a, some, owner, arc >= 0, chords(), bend)
+            if len(some.part) and smooth[some.part[0]]:
+                rows = some.part[np.flatnonzero(np.diff(some.part, prepend=-1))]
+                begin = tips.take(rows, axis=0) if tool.ndim == 1 else self.actual(start[rows], tool[rows])
+                some = self._curves(a, owner, rows, begin, tips, some, steps, courses(), near, worst)
+            if len(some.part):
+                self._along(a, owner, some, courses(), near, worst)
+        if cuts.size:
+            self._along(a, owner, Samples(cuts, np.ones(len(cuts)), reached[cuts]), courses(), near, worst)
         self._starts(a, b, owner, tips, waypoint, courses, near, worst)
-        return len(end) + samples
+        return int(steps.sum()) if self.has_play else len(end)
 
     def _ends(self, a: int, b: int, tips: Array, ends: Index, waypoint: Single) -> None:
         """How far the tip is off at the ends of nominal moves a..b, behind `ends` of the moves that reach
@@ -265,37 +273,40 @@ class Tracer:
         if self.joints is not None:
             self.joints.put_across(waypoint, a + np.arange(b - a), away)
 
-    def _samples(
+    def _in_order(
         self, start: Array, end: Array, arc: Index, steps: Index, known: Mask, tool: Array,
         kind: npt.NDArray[np.uint8],
-    ) -> tuple[Array, _Inner]:  # fmt: skip
-        """Where the tip really is at the end of each part, and at samples inside parts."""
-        if self.has_play:
-            # play depends on all earlier moves, so the samples are taken in order
-            point, part, share = self.points(start, end, arc, steps, (arc >= 0) & known)
-            inside, before = share < 1.0, self.play
-            actual = self.actual(point, tool if tool.ndim == 1 else tool[part])
-            plays = self.plays
-            before = plays[0] if before is None else before
-            samples = _Inner(part[inside], share[inside], actual[inside])
-            taken_up = self._turns(start, end, arc, part, share, np.vstack((before, plays)), tool, kind)
-            return actual[~inside], samples.with_more(taken_up)
-        # those of straight moves, then those of arcs
-        long = [np.flatnonzero((steps > 1) & ((arc >= 0) == curved)) for curved in (False, True)]
-        parts = [_inside(steps.take(rows)) for rows in long]
-        point = np.concatenate([
-            _between(start.take(long[0], axis=0), end.take(long[0], axis=0), *parts[0]),
-            self._shapes(start, end, arc, long[1]).at(*parts[1]),
-        ])  # fmt: skip
-        part = np.concatenate([rows.take(of) for rows, (of, _) in zip(long, parts, strict=True)])
-        share = np.concatenate([share for _, share in parts])
-        reached = self.actual(end, tool)
-        return reached, _Inner(part, share, self.actual(point, tool if tool.ndim == 1 else tool[part]))
+    ) -> tuple[Array, Samples]:  # fmt: skip
+        """Where the tip really is at the end of each part, and at samples inside parts. The play depends on
+        all earlier moves, so they are taken in order."""
+        point, part, share = self.points(start, end, arc, steps, (arc >= 0) & known)
+        inside, before = share < 1.0, self.play
+        actual = self.actual(point, tool if tool.ndim == 1 else tool[part])
+        plays = self.plays
+        before = plays[0] if before is None else before
+        samples = Samples(part[inside], share[inside], actual[inside])
+        taken_up = self._turns(start, end, arc, part, share, np.vstack((before, plays)), tool, kind)
+        return actual[~inside], samples.with_more(taken_up)
+
+    def _between_ends(
+        self, start: Array, end: Array, arc: Index, smooth: Mask, steps: Index, tool: Array
+    ) -> Iterator[Samples]:
+        """Samples inside parts of a machine without play, few at a time: of straight ones, of arcs that are
+        sampled as `smooth` curves, then of other arcs."""
+        for kind in (arc < 0, smooth, (arc >= 0) & ~smooth):
+            for rows in runs(np.flatnonzero((steps > 1) & kind), steps):
+                of, share = shares_inside(steps[rows])
+                if arc[rows[0]] >= 0:
+                    point = self._shapes(start, end, arc, rows).at(of, share)
+                else:
+                    point = between(start[rows], end[rows], of, share)
+                part = rows.take(of)
+                yield Samples(part, share, self.actual(point, tool if tool.ndim == 1 else tool[part]))
 
     def _turns(
         self, start: Array, end: Array, arc: Index, part: Index, share: Array, plays: Array, tool: Array,
         kind: npt.NDArray[np.uint8],
-    ) -> _Inner:  # fmt: skip
+    ) -> Samples:  # fmt: skip
         """Samples where an axis that turned round has taken up its backlash: from there on the tip is off by
         all of it. `plays` are those before and at each of the samples `share` of `part`."""
         turned = np.flatnonzero(any_in_row(plays[1:] != plays[:-1]) & (kind[part] != Kind.RAPID))
@@ -314,19 +325,19 @@ class Tracer:
         play = play_after(old[rows], point - begin[rows], width[rows])
         play[np.arange(len(rows)), axis] = new[rows, axis]
         error = self.model.error(point, tool if tool.ndim == 1 else tool[part[rows]], play)
-        return _Inner(part[rows], where, point + error)
+        return Samples(part[rows], where, point + error)
 
     def _at(self, start: Array, end: Array, arc: Index, part: Index, share: Array) -> Array:
         """(m, 3) positions on moves at shares of them."""
         rows = np.flatnonzero(arc >= 0)
         if not rows.size:
-            return _between(start, end, part, share)
+            return between(start, end, part, share)
         shapes = self._shapes(start, end, arc, rows)
-        straight, curved, of = _kinds(arc >= 0, part)
+        straight, curved, of = kinds(arc >= 0, part)
         on_arcs = shapes.at(of, share[curved])
         if not straight.size:
             return on_arcs
-        on_lines = _between(start, end, part[straight], share[straight])
+        on_lines = between(start, end, part[straight], share[straight])
         point = np.empty((len(part), 3))
         for axis in range(3):
             point[curved, axis], point[straight, axis] = on_arcs[:, axis], on_lines[:, axis]
@@ -348,7 +359,7 @@ class Tracer:
 
     def _starts(
         self, a: int, b: int, owner: Index, tips: Array, waypoint: Single, courses: Callable[[], Courses],
-        near: _Nearness, worst: Single,
+        near: Nearness, worst: Single,
     ) -> None:  # fmt: skip
         """A cut starts where the moves before it ended, which may be farther off than any of its samples."""
         away = np.concatenate(([self.away], waypoint[:-1]))
@@ -362,7 +373,7 @@ class Tracer:
         rows, begin, tip = rows[some], begin[some], tip[some]
         some = owner[begin] == rows
         if some.any():
-            starts = _Inner(begin[some], np.zeros(int(some.sum())), tip[some])
+            starts = Samples(begin[some], np.zeros(int(some.sum())), tip[some])
             self._along(a, owner, starts, courses(), near, worst)
 
     def _arc_steps(
@@ -402,7 +413,7 @@ class Tracer:
         return point if self.blind is None else np.where(self.blind[move], 0.0, point)
 
     def _along(
-        self, a: int, owner: Index, inner: _Inner, courses: Courses, near: _Nearness, worst: Single
+        self, a: int, owner: Index, inner: Samples, courses: Courses, near: Nearness, worst: Single
     ) -> None:
         """Distances of samples from their nominal move, the largest per move."""
         of = owner[inner.part]
@@ -417,9 +428,9 @@ class Tracer:
         np.fmax.at(worst, of, distance.astype(np.float32))
 
     def _curves(
-        self, a: int, owner: Index, rows: Index, begin: Array, tips: Array, inner: _Inner, steps: Index,
-        courses: Courses, near: _Nearness, worst: Single,
-    ) -> _Inner:  # fmt: skip
+        self, a: int, owner: Index, rows: Index, begin: Array, tips: Array, inner: Samples, steps: Index,
+        courses: Courses, near: Nearness, worst: Single,
+    ) -> Samples:  # fmt: skip
         """How far arcs `rows` leave their nominal arcs, the largest per move, from equal steps: the samples
         `inner`, and the tip where they `begin` and end. Returns those that lie beyond the ends of their
         nominal arc, where more counts than what is across it."""
@@ -440,71 +451,24 @@ class Tracer:
         np.fmax.at(worst, owner[rows], peaks((radial, level), count).astype(np.float32))
         return inner.pick(beyond[within])
 
-    def _bend(self, a: int, tips: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single) -> None:
-        """How far the samples of straight parts leave the chord between the actual ends of their part, which
-        are `tips` and the ones behind them."""
+    def _chords(self, a: int, owner: Index, tips: Array) -> Segments:
+        """The chords between the actual ends of parts, which are `tips` and the ones behind them."""
+        of = a + owner
+        return Segments.of(self._known(of, tips[:-1]), self._known(of, tips[1:]))
+
+    def _bend(
+        self, a: int, inner: Samples, owner: Index, curved: Mask, chords: Segments, bend: Single
+    ) -> None:
+        """How far the samples of straight parts leave the chord of their part."""
         part, actual = inner.part, inner.actual
         if curved.any():
             straight = np.flatnonzero(~curved[part])
             part, actual = part[straight], actual.take(straight, axis=0)
         if not len(part):
             return
-        of = a + owner
-        ways = self._known(of, tips[:-1]), self._known(of, tips[1:])
         mine = owner[part]
-        departure = segment_distance(self._known(a + mine, actual), *ways, part)
+        departure = chords.distance(self._known(a + mine, actual), part)
         np.fmax.at(bend, mine, departure.astype(np.float32))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Inner:
-    """Samples inside parts: the part, the share of it, and where the tip is."""
-
-    part: Index
-    share: Array
-    actual: Array
-
-    def pick(self, which: Mask) -> _Inner:
-        """Some of them."""
-        rows = np.flatnonzero(which)
-        return _Inner(self.part.take(rows), self.share.take(rows), self.actual.take(rows, axis=0))
-
-    def with_more(self, other: _Inner) -> _Inner:
-        """These and others."""
-        return _Inner(
-            np.concatenate((self.part, other.part)),
-            np.concatenate((self.share, other.share)),
-            np.concatenate((self.actual, other.actual)),
-        )
-
-    def with_ends(self, cuts: Index, reached: Array) -> _Inner:
-        """These, and the ends of the parts `cuts`."""
-        return self.with_more(_Inner(cuts, np.ones(len(cuts)), reached[cuts]))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Nearness:
-    """Moves from `first` of a path, and (m,) the `owner` of each among nominal moves."""
-
-    owner: Index
-    path: Toolpath
-    first: int
-
-    def share(self, part: Index, share: Array, of: Index) -> Array:
-        """Roughly where on its nominal arc each sample lies: by the angles of the arcs that it became."""
-        owner = self.owner
-        if (owner == np.arange(len(owner))).all():
-            # each move became one
-            return share
-        arcs = self.path.arcs.within(self.first, self.first + len(owner))
-        size, row = np.abs(self.path.arcs.sweep_rad[arcs]), self.path.arcs.move[arcs] - self.first
-        turn = np.zeros(len(owner))
-        turn[row] = size
-        before = np.cumsum(turn) - turn
-        total = np.bincount(owner[row], size, minlength=int(owner[-1]) + 1)
-        begin = np.cumsum(total) - total
-        place = before[part] - begin[of] + share * turn[part]
-        return np.asarray(place / np.maximum(total[of], 1e-12))
 
 
 def owner_of(groups: Index, first: int, last: int) -> Index:
@@ -515,40 +479,6 @@ def owner_of(groups: Index, first: int, last: int) -> Index:
     if np.array_equal(groups, move):
         return move - first
     return np.searchsorted(groups, move)
-
-
-def _inside(steps: Index) -> tuple[Index, Array]:
-    """The move of each sample inside moves of so many equal steps, and its share of the move."""
-    count = steps - 1
-    part = np.repeat(np.arange(len(steps)), count)
-    share = np.arange(1, len(part) + 1) - np.repeat(np.cumsum(count) - count, count)
-    return part, share / np.repeat(steps, count)
-
-
-def _kinds(on_arc: Mask, of: Index) -> tuple[Index, Index, Index]:
-    """Which samples of moves `of` are on straight moves, which are on arcs, and the index of the arc of these
-    among the moves that are arcs."""
-    mine = on_arc[of]
-    curved = np.flatnonzero(mine)
-    return np.flatnonzero(~mine), curved, (np.cumsum(on_arc) - 1)[of[curved]]
-
-
-def _equal_steps(path: Toolpath, step_mm: float) -> Index:
-    """(n,) into how many equal steps of `step_mm` at most each move is divided."""
-    start, arcs = path.starts_mm(), path.arcs
-    length = np.nan_to_num(np.sqrt(((path.end_mm - start) ** 2).sum(axis=1)))
-    if len(arcs):
-        radius = np.sqrt(np.nansum((start[arcs.move] - arcs.centre_mm) ** 2, axis=1))
-        length[arcs.move] = np.maximum(length[arcs.move], radius * np.abs(arcs.sweep_rad))
-    return np.asarray(np.maximum(np.ceil(length / step_mm), 1), np.int64)
-
-
-def _between(start: Array, end: Array, part: Index, share: Array) -> Array:
-    """(m, 3) points at shares of straight parts."""
-    point = (end - start).take(part, axis=0)
-    point *= share[:, None]
-    point += start.take(part, axis=0)
-    return np.asarray(point)
 
 
 def _unknown(end_mm: Array) -> Mask:

@@ -60,7 +60,7 @@ class Counts(IntEnum):
 @dataclass(frozen=True, slots=True, eq=False)
 class Side:
     """What a proof keeps of a `Deviation`: (n,) `side` in mm, and of feed moves that count `bend_mm`, the
-    largest part that comes from chords. `summary` are `figures` of all moves."""
+    largest part that comes from chords, 0 of the nominal program. `summary` are `figures` of all moves."""
 
     side: Single
     bend_mm: float
@@ -202,17 +202,18 @@ def prove(
         counts[some] = _counts(part_of, how[some], exempt[some])
     feed = marked(len(path), lambda some: np.asarray(counts[some] == Counts.FEED))
 
-    def side(program: Program, ends: Index, told: Progress) -> _Measured:
+    def side(program: Program, ends: Index, chords: Mask | None, told: Progress) -> _Measured:
         bottom, stroke = strokes_mm(nominal, target, program.toolpath, program.holes, model, bend)
         by_hole = nominal.holes.inside(len(path)) if len(bottom) else None
-        deviation = measure(path, target, program.toolpath, ends, feed, model, bend, told, elsewhere=by_hole)
+        other = program.toolpath
+        deviation = measure(path, target, other, ends, chords, model, bend, told, elsewhere=by_hole)
         size = _sizes(deviation, how, bottom, stroke)
         for some in spans(len(size)):
             size[some][counts[some] > Counts.LEFT] = np.nan
         return _Measured(deviation.waypoint, deviation.side, deviation.bend_mm, size)
 
-    before = side(nominal, _each(groups), part(tell, 0.4, 0.7))
-    after = side(corrected, groups, part(tell, 0.7, 1.0))
+    before = side(nominal, _each(groups), None, part(tell, 0.4, 0.7))
+    after = side(corrected, groups, feed, part(tell, 0.7, 1.0))
     before_mm, after_mm = before.size, after.size
     blind = found(len(path), lambda some: np.isnan(after_mm[some]) & (counts[some] <= Counts.LEFT))
     counts[blind[counts[blind] == Counts.LEFT]] = Counts.UNKNOWN
