@@ -248,7 +248,7 @@ class Tracer:
         tips = np.concatenate((self.before[None], reached))
         self._ends(a, b, tips, ends, waypoint)
         worst[:] = waypoint
-        near = Nearness(owner, path, first)
+        near = Nearness(path, first, owner)
         chords = cache(lambda: self._chords(a, owner, tips))
         parts = [inner] if inner is not None else self._between_ends(start, end, arc, smooth, steps, tool)
         for some in parts:

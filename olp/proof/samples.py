@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 
@@ -40,29 +41,33 @@ class Samples:
         return self.with_more(Samples(cuts, np.ones(len(cuts)), reached[cuts]))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Nearness:
-    """Moves from `first` of a path, and (m,) the `owner` of each among nominal moves."""
+    """Where on their nominal arcs samples lie roughly, by the angles of the arcs that these became: moves
+    from `first` of a path, of which nominal moves `owner` (m,) became each."""
 
-    owner: Index
-    path: Toolpath
-    first: int
+    def __init__(self, path: Toolpath, first: int, owner: Index) -> None:
+        self.path, self.first, self.owner = path, first, owner
 
-    def share(self, part: Index, share: Array, of: Index) -> Array:
-        """Roughly where on its nominal arc each sample lies: by the angles of the arcs that it became."""
+    @cached_property
+    def _angles(self) -> tuple[Array, Array, Array] | None:
+        """(m,) rad of each move and before it on its nominal arc, (n,) of all of a nominal move; None where
+        each move became one."""
         owner = self.owner
-        if (owner == np.arange(len(owner))).all():
-            # each move became one
-            return share
+        if np.array_equal(owner, np.arange(len(owner))):
+            return None
         arcs = self.path.arcs.within(self.first, self.first + len(owner))
         size, row = np.abs(self.path.arcs.sweep_rad[arcs]), self.path.arcs.move[arcs] - self.first
         turn = np.zeros(len(owner))
         turn[row] = size
-        before = np.cumsum(turn) - turn
         total = np.bincount(owner[row], size, minlength=int(owner[-1]) + 1)
-        begin = np.cumsum(total) - total
-        place = before[part] - begin[of] + share * turn[part]
-        return np.asarray(place / np.maximum(total[of], 1e-12))
+        return turn, np.cumsum(turn) - turn - (np.cumsum(total) - total)[owner], np.maximum(total, 1e-12)
+
+    def share(self, part: Index, share: Array, of: Index) -> Array:
+        """(k,) the share of its nominal move `of` (k,) at which each sample lies, `share` (k,) of `part`."""
+        if self._angles is None:
+            return share
+        turn, before, total = self._angles
+        return np.asarray((before[part] + share * turn[part]) / total[of])
 
 
 def shares_inside(steps: Index) -> tuple[Index, Array]:
