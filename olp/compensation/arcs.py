@@ -256,7 +256,11 @@ def sampled(
     point, command = point.reshape(shape), command.reshape(shape)
     away = command - point
     r0, r1 = (np.hypot(*arms(point[:, k], centre, plane)) for k in (0, -1))
-    return Bend(point, command, share, centre, r1 - r0, np.abs(away - away[:, :1]).max(axis=(1, 2)) < 1e-9)
+    # most pieces are not, as their ends show
+    rigid = most_in_row(np.abs(away[:, -1] - away[:, 0])) < _ALIKE_MM
+    some = np.flatnonzero(rigid)
+    rigid[some] = np.abs(away[some] - away[some, :1]).max(axis=(1, 2)) < _ALIKE_MM
+    return Bend(point, command, share, centre, r1 - r0, rigid)
 
 
 def _inside(play: Array) -> Array:

@@ -54,8 +54,9 @@ class ArcShapes:
         return ArcShapes(plane, c0, c1, radius, wider, np.arctan2(s1, s0), sweep, s2, e2 - s2)
 
     def at(self, which: Index, share: Array) -> Array:
-        """(n, 3) points at shares (n,) of arcs `which` (n,); (n, s, 3) at shares (n, s) of arcs (n, 1)."""
-        points = np.empty((*share.shape, 3))
+        """(n, 3) points at shares (n,) of arcs `which` (n,); (n, s, 3) at shares (n, s) of arcs (n, 1). They
+        lie in memory column by column."""
+        points = np.moveaxis(np.empty((3, *share.shape)), 0, -1)
         rows, planes = max(_POINTS // int(np.prod(share.shape[1:])), 1), distinct(self.plane).tolist()
         for a in range(0, len(share), rows):
             self._put(points[a : a + rows], which[a : a + rows], share[a : a + rows], planes)
