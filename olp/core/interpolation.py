@@ -150,6 +150,12 @@ class DenseTable:
         rise[:, :-1] = np.diff(value) if nodes is None else np.diff(value) / np.diff(nodes)
         return cls(low, step, len(values), nodes, constant, read_only(value), read_only(rise), guide)
 
+    def at_nodes(self) -> Array:
+        """(count, m) the columns at the nodes."""
+        varying = iter(self.value)
+        columns = [next(varying) if one is None else np.full(self.count, one) for one in self.constant]
+        return np.stack(columns, axis=1) if columns else np.zeros((self.count, 0))
+
     def lookup(self, q: Array) -> list[Column]:
         """One (k,) array, or a float where constant, per column at finite q (k,); end values outside."""
         if not len(self.value):

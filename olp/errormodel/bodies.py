@@ -26,7 +26,8 @@ TOOL_REACH_MM = 1000.0
 class Body:
     """Axis `axis` of the chain. `shear` (3,) times (q - datum) is its squareness; `lever_arms` lists (rows,
     lever arm). `sine_terms` 1 or 2: so many terms of the sine series (and cosine to second order) are exact
-    to TRIGONOMETRY_MM; 0: take sine and cosine themselves."""
+    to TRIGONOMETRY_MM; 0: take sine and cosine themselves. `sines` are the components with the sines of the
+    angles where a table of these saves the second term."""
 
     axis: int
     carries_workpiece: bool
@@ -35,6 +36,7 @@ class Body:
     datum_mm: float
     lever_arms: LeverArms
     sine_terms: int
+    sines: AxisComponents | None = None
 
 
 @lru_cache(maxsize=1)  # a run builds the model that refuses what is outside the box, and that which holds
@@ -60,15 +62,21 @@ def build_bodies(
                 own = lever_arms_of(measured, datum_mm, axis, after, carries, tool_terms)
                 cyclic.append(ActingTerm.of(term, own, lever_arms))
         components = AxisComponents.of(calibration, axis, skip, tuple(cyclic))
-        terms = _sine_terms(components, lever_arms, calibration.box_mm)
-        bodies.append(Body(j, carries, components, tilts[axis], datum_mm[j], lever_arms, terms))
+        peak = max((v.peak for v in components.variation[3:] if v is not None), default=0.0)
+        reach_mm = _reach_mm(lever_arms, calibration.box_mm)
+        terms = _sine_terms(peak, reach_mm)
+        sines = components.with_sines(TRIGONOMETRY_MM / reach_mm) if terms == 2 else None
+        bodies.append(Body(j, carries, components, tilts[axis], datum_mm[j], lever_arms, terms, sines))
     return tuple(bodies)
 
 
-def _sine_terms(components: AxisComponents, lever_arms: LeverArms, box_mm: Array) -> int:
-    peak = max((v.peak for v in components.variation[3:] if v is not None), default=0.0)
+def _reach_mm(lever_arms: LeverArms, box_mm: Array) -> float:
+    """The longest lever arm along an axis, anywhere in the box and with any tool."""
     tool = np.array([[TOOL_REACH_MM] * 3, [-TOOL_REACH_MM] * 3])
-    reach = max(float(lever_arm.reach_mm(box_mm, tool).max()) for _, lever_arm in lever_arms)
-    if (peak * peak) * (peak * peak) / 8.0 * reach > TRIGONOMETRY_MM:
+    return max(float(lever_arm.reach_mm(box_mm, tool).max()) for _, lever_arm in lever_arms)
+
+
+def _sine_terms(peak: float, reach_mm: float) -> int:
+    if (peak * peak) * (peak * peak) / 8.0 * reach_mm > TRIGONOMETRY_MM:
         return 0
-    return 2 if peak**3 / 6.0 * reach > TRIGONOMETRY_MM else 1
+    return 2 if peak**3 / 6.0 * reach_mm > TRIGONOMETRY_MM else 1

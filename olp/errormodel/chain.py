@@ -47,15 +47,14 @@ class RigidBody(Boxed):
         tool = as_tool(tool_mm, len(points))
         states = None if play is None else as_points(play, "play")
         # column by column where the points lie so
-        result = np.zeros_like(points)
+        result = np.empty_like(points)
         for start in range(0, len(points), BLOCK):
             part = slice(start, start + BLOCK)
             position, unknown = self._positions(points[part])
             arms = self._arms(tool, part)
             moved = None if states is None else states[part]
             for i, value in enumerate(self._block(position, arms, moved)):
-                if value is not None:
-                    result[part, i] = value
+                result[part, i] = 0.0 if value is None else value
             if unknown is not None:
                 result[part][unknown @ self.depends_on.T] = np.nan
         return result
@@ -133,18 +132,16 @@ class RigidBody(Boxed):
 
     def _positions(self, points: Array) -> tuple[list[Array], Mask | None]:
         """Finite columns of positions, and (n, 3) where they are unknown; None where all are known."""
-        unknown = np.isnan(points)
-        if not unknown.any():
-            unknown_or_none = None
-        else:
-            unknown_or_none = unknown
+        unknown = None
+        if np.isnan(np.min(points, initial=0.0)):
+            unknown = np.isnan(points)
             points = np.where(unknown, self.box_mm[:, 0], points)
-        columns = [points[:, k].copy() for k in range(3)]
+        columns = [np.ascontiguousarray(points[:, k]) for k in range(3)]
         if self.hold:
             # as `clamped`, but column by column, which is faster
-            for column, (low, high) in zip(columns, self.box_mm.tolist(), strict=True):
-                np.clip(column, low, high, out=column)
-        return columns, unknown_or_none
+            box = self.box_mm.tolist()
+            columns = [np.clip(column, *ends) for column, ends in zip(columns, box, strict=True)]
+        return columns, unknown
 
     def _arms(self, tool: Array, part: slice) -> list[Column]:
         if not self.tool_terms:
@@ -157,7 +154,8 @@ class RigidBody(Boxed):
         error: Three = [None, None, None]
         for body in self.bodies:
             q = position[body.axis]
-            six = body.components.evaluate(q, None if play is None else play[:, body.axis])
+            components = body.sines if body.sines is not None and self.exact else body.components
+            six = components.evaluate(q, None if play is None else play[:, body.axis])
             shift: Three = [None if s == 0.0 else s * (q - body.datum_mm) for s in body.shear]
             turned: Three = [None, None, None]
             if any(angle is not None for angle in six[3:]):
@@ -173,8 +171,9 @@ class RigidBody(Boxed):
         return error
 
     def _turn(self, body: Body, six: Six, position: list[Array], tool: list[Column], carried: Three) -> Three:
-        """(S - I)(lever arm + carried), each row with its own lever arm."""
-        angles = [(a, *_sine(angle, body.sine_terms)) for a, angle in enumerate(six[3:]) if angle is not None]
+        """(S - I)(lever arm + carried), each row with its own lever arm; angles as the body states them."""
+        terms = body.sine_terms if body.sines is None else 1
+        angles = [(a, *_sine(angle, terms)) for a, angle in enumerate(six[3:]) if angle is not None]
         if body.carries_workpiece:
             angles.reverse()
         turned: Three = [None, None, None]

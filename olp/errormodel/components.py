@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -99,6 +100,19 @@ class AxisComponents:
             varies.append(bool(repeating) or any(p.varies for p in parts))
             variation.append(Variation.total([*parts, *repeating]) if parts or repeating else None)
         return cls(j, table, mean, half, cyclic, calibration.backlash_mm[j], tuple(variation), tuple(varies))
+
+    def with_sines(self, exact_rad: float) -> AxisComponents | None:
+        """The same with the sines of the angles in the table, which are exact to `exact_rad` between nodes,
+        too. None where they are not, and where angles are more than columns of the table."""
+        if self.cyclic or any(slot is not None for slot in self.half[3:]):
+            return None
+        values, table = self.table.at_nodes(), self.table
+        angles = values[:, [slot for slot in self.mean[3:] if slot is not None]]
+        sines, between = np.sin(angles), np.sin(0.5 * (angles[:-1] + angles[1:]))
+        if np.abs(between - 0.5 * (sines[:-1] + sines[1:])).max(initial=0.0) > exact_rad:
+            return None
+        values[:, [slot for slot in self.mean[3:] if slot is not None]] = sines
+        return replace(self, table=DenseTable.of(table.low, table.step, table.nodes, values, table.guide))
 
     def evaluate(self, q: Array, play: Array | None) -> Six:
         """Values at finite positions q (n,) and play (n,) in [-1, 1]."""
