@@ -231,13 +231,13 @@ class Segments:
         distance = np.empty(len(point))
         for a in range(0, len(point), _POINTS):
             part = slice(a, a + _POINTS)
-            of = part if which is None else which[part]
-            away = [point[part, axis] - column[of] for axis, column in enumerate(self.begin)]
-            way = [column[part].copy() if which is None else column[of] for column in self.along]
-            share = np.zeros(len(away[0]))
+            of = np.arange(a, min(a + _POINTS, len(point))) if which is None else which[part]
+            away = [point[part, axis] - column.take(of) for axis, column in enumerate(self.begin)]
+            way = [column.take(of) for column in self.along]
+            share = np.zeros(len(of))
             for there, ahead in zip(away, way, strict=True):
                 share += there * ahead
-            share *= self.inverse[of]
+            share *= self.inverse.take(of)
             np.clip(share, 0.0, 1.0, out=share)
             square = np.zeros(len(share))
             for there, ahead in zip(away, way, strict=True):

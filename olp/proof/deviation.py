@@ -406,7 +406,9 @@ class Tracer:
             self.between = np.stack((low[-1], high[-1]))
             play = ((low + high) * 0.5)[len(chain) - len(point) :]
             self.last, self.play, self.plays = point[-1:], play[-1], play
-        return point + self.model.error(point, tool, play)
+        actual = self.model.error(point, tool, play)
+        actual += point
+        return actual
 
     def _known(self, move: Index, point: Array) -> Array:
         """(m, 3) points without the axes that are unknown at the ends of their nominal moves (m,)."""
