@@ -69,8 +69,8 @@ def test_series_and_sines_are_the_same_turn(angle: float) -> None:
 
 
 def test_sines_are_tabled_where_they_are_exact_between_nodes_too() -> None:
-    """An angle that rises over one cell: its sine leaves the chord by a sixteenth of its third power, times 1 m of
-    tool. What has a direction or repeats is more than a table."""
+    """The sine of an angle that rises over one cell leaves its chord by a sixteenth of the third power, times
+    1 m of tool. What has a direction or repeats is more than a table."""
     for most, tabled in ((6e-5, True), (8e-5, False)):
         straight = Curve("Z", [-400.0, 0.0], {"EAZ": [0.0, most]}, interpolation="linear")
         both = body("Z", curves=(straight,))
@@ -97,3 +97,6 @@ def test_tabled_sines_turn_as_the_series_does() -> None:
     tool = np.array([900.0, -700.0, 800.0])
     np.testing.assert_allclose(model.error(place, tool), series.error(place, tool), atol=2e-11, rtol=0)
     assert np.array_equal(model.rotation(place), series.rotation(place))
+    # to first order the angles themselves turn
+    first, other = (RigidBody(BOX, False, some, exact=False) for some in (bodies, series.bodies))
+    assert np.array_equal(first.error(place, tool), other.error(place, tool))
