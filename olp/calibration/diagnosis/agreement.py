@@ -199,16 +199,20 @@ class _Given:
         large, and the log evidence of the others that this adds."""
         if factor == 1.0:
             return self, 0.0
-        change = (factor**-2 - 1.0) * precision
-        own = self.root[part]
-        values, vectors = np.linalg.eigh(np.eye(own.shape[1]) + own.T @ change @ own)
-        # what they are at least, but for rounding
-        values = np.maximum(values, min(1.0, factor**-2))
-        root = self.root @ (vectors / np.sqrt(values))
-        mean = self.mean - root @ (root[part].T @ (change @ self.mean[part]))
-        more = -0.5 * float(np.log(values).sum()) - len(part) * math.log(factor)
-        more -= 0.5 * float(self.mean[part] @ change @ mean[part])
-        return _Given(self.columns, mean, root), more
+        from scipy.linalg import eigh
+
+        change = factor**-2 - 1.0
+        basis, inner = np.linalg.qr(self.root[part].T)
+        # the QR iteration: divide and conquer fails on some clusters of ones (OpenBLAS)
+        share, vectors = eigh(inner @ precision @ inner.T, driver="ev")
+        # no curve is known less than before any reading, but for rounding
+        more = np.log1p(change * np.clip(share, 0.0, 1.0))
+        directions = basis @ vectors
+        root = self.root + (self.root @ directions * np.expm1(-0.5 * more)) @ directions.T
+        pull = change * precision @ self.mean[part]
+        mean = self.mean - root @ (root[part].T @ pull)
+        log = -0.5 * float(more.sum()) - len(part) * math.log(factor) - 0.5 * float(pull @ mean[part])
+        return _Given(self.columns, mean, root), log
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from cases.fast import some_of_a_campaign
 from judge import simulated
 from judge.simulated import OFFSETS
 
-from olp.calibration.diagnosis.agreement import Agreement, Compared, Tried, compared
+from olp.calibration.diagnosis.agreement import Agreement, Compared, Tried, _given, compared
 from olp.calibration.diagnosis.agreement_report import agreement_findings, agreement_rows
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.observations.artefact import Artefact
@@ -74,6 +74,32 @@ def test_a_planted_mistake_is_named(seed: int, file: str, factor: float, words: 
     assert [one.label for one in outcome.wrong] == [file]
     assert outcome.wrong[0].named is not None and words in outcome.wrong[0].named.words
     assert not outcome.unlike
+
+
+@pytest.mark.parametrize("factor", [0.3, 4.8481368, 25.4])
+@pytest.mark.parametrize("told", [0.0, 1e4])
+def test_curves_of_another_size_are_as_if_all_was_adjusted_again(factor: float, told: float) -> None:
+    """Where others tell nearly nothing of a curve, its covariance is its prior: a cluster of ones."""
+    rng = np.random.default_rng(4)
+    part, columns = np.arange(3, 9), np.arange(2, 14)
+    root = rng.normal(size=(16, 16))
+    prior = np.eye(16)
+    prior[np.ix_(part, part)] = 1e4 * root[:6] @ root[:6].T
+    heard, right = told * root[:, :4] @ root[:, :4].T, rng.normal(size=16)
+    larger = prior.copy()
+    larger[np.ix_(part, part)] /= factor**2
+    place, own = np.searchsorted(columns, part), prior[np.ix_(part, part)]
+    scaled, more = _given(prior + heard, right, columns).scaled(place, own, factor)
+    again = _given(larger + heard, right, columns)
+    assert np.allclose(scaled.root @ scaled.root.T, again.root @ again.root.T, rtol=1e-6, atol=1e-9)
+    assert np.allclose(scaled.mean, again.mean, rtol=1e-6, atol=1e-9)
+
+    def evidence(precision: np.ndarray) -> float:
+        total = precision + heard
+        logdet = np.linalg.slogdet(precision)[1] - np.linalg.slogdet(total)[1]
+        return 0.5 * float(logdet + right @ np.linalg.solve(total, right))
+
+    assert more == pytest.approx(evidence(larger) - evidence(prior), abs=1e-4)
 
 
 @pytest.mark.slow
