@@ -5,7 +5,8 @@
 Random machines of 3 x 2 x 1 m, six chains, both families. After a full set of lines: 40 points of a tracker
 of 8 um in a Latin hypercube, and 20 or fewer that are chosen by the covariance of the fit. From nothing: 120
 points of a hypercube, and chosen ones in lots of 30, each after a fit of those before. Everything is fitted
-together and judged at fresh positions with two tools, rms length in um in the best-fit frame.
+together and judged at fresh positions with two tools, rms length in um in the best-fit frame. Before that:
+what is predicted for a hypercube, and what no choice of as many points goes under.
 """
 
 from __future__ import annotations
@@ -16,13 +17,16 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from cases.sequential import begun, chosen, residual_um, today
+from cases.sequential import begun, chosen, predicted, residual_um, today
 
 SEEDS = 6
 SIGMA = 0.008
 
 
 def main(seeds: int, *families: str) -> None:
+    for n in (60, 80, 120):
+        hypercube, bound = predicted(begun(0, "smooth", lines=False)[0], n, SIGMA)
+        print(f"{n} points: hypercube {hypercube:.2f} predicted, no choice below {bound:.2f}", flush=True)
     for family in families or ("smooth", "rough"):
         rows: dict[str, list[float]] = {}
 
