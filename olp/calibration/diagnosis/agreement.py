@@ -125,11 +125,6 @@ class Agreement:
         """What may be wrong with it without notice, as the readings do not exclude it."""
         return tuple(tried for tried in self.tried if tried.log_odds > -EXCLUDED)
 
-    @property
-    def possible(self) -> tuple[str, ...]:
-        """The kinds of what is open."""
-        return tuple(sorted({tried.kind for tried in self.open}))
-
 
 def _in_words(tried: Iterable[Tried], best: float) -> str:
     """In words what is not excluded against log odds of `best`."""

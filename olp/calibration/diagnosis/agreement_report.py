@@ -12,6 +12,7 @@ from olp.calibration.diagnosis.agreement import Agreement, Compared, Tried
 from olp.calibration.estimator.character import class_of, largest
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.summary import grid_of
+from olp.core.arrays import Array
 from olp.core.machine import Vector
 from olp.core.units import UM_PER_MM
 from olp.findings.catalogue import Finding
@@ -20,8 +21,10 @@ from olp.findings.catalogue import Finding
 _LEAST_UM = 0.1
 #: Files that one finding lists, at most.
 _LISTED = 8
-#: Positions along each axis where harm is looked for.
-_PLACES = 5
+#: Positions along each axis of a lattice where harm is looked for: ends and corners have the longest levers.
+_LEVELS = 3
+#: Random positions beside them: a curve may differ between the same few positions of its axis only.
+_AMONG = 300
 
 
 def agreement_findings(found: Compared, fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
@@ -61,7 +64,7 @@ def agreement_rows(found: Compared, fit: Fit, tools: Sequence[Vector]) -> list[d
             "chi_square_per_direction": one.misfit.reduced,
             "wrong": one.causes if id(one.misfit) in wrong else "",
             "log10_odds_of_a_mistake": one.doubt / math.log(10.0) if np.isfinite(one.doubt) else None,
-            "not_excluded": ", ".join(one.possible),
+            "not_excluded": ", ".join(sorted({tried.kind for tried in _open(one, fit)})),
             "hidden_harm_um": harm,
         }
         for one, (harm, _) in _harms(found, fit, tools)
@@ -77,13 +80,15 @@ def _harms(
 ) -> Iterator[tuple[Agreement, tuple[float, str]]]:
     """What of each source is not excluded and changes the errors most: by how much in um, and its kind. It is
     taken over the box with all tools, those of the readings where none are known."""
-    sides = [np.linspace(low, high, _PLACES) for low, high in fit.box_mm.tolist()]
-    position = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
+    sides = [np.linspace(low, high, _LEVELS) for low, high in fit.box_mm.tolist()]
+    lattice = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
+    among = np.random.default_rng(1).uniform(*fit.box_mm.T, (_AMONG, 3))
+    position = np.concatenate([lattice, among])
     rows = np.stack([fit.design(position, np.array(tool)) for tool in tools or _read_with(fit)])
     for one in found.sources:
         harms = [(0.0, "")]
-        for tried in one.open:
-            if len(tried.change) and _plausible(one.component, tried, fit):
+        for tried in _open(one, fit):
+            if len(tried.change):
                 error = rows @ tried.change
                 harms.append((float(np.linalg.norm(error, axis=-1).max()) * UM_PER_MM, tried.kind))
         yield one, max(harms)
@@ -96,10 +101,19 @@ def _read_with(fit: Fit) -> list[Vector]:
     return [(x, y, z) for x, y, z in outer.tolist()]
 
 
+def _open(one: Agreement, fit: Fit) -> list[Tried]:
+    """What may be wrong with a source without notice, of what a machine can be."""
+    return [tried for tried in one.open if not len(tried.change) or _plausible(one.component, tried, fit)]
+
+
 def _plausible(name: str, tried: Tried, fit: Fit) -> bool:
-    """Whether a curve that was read is no larger, if it is so, than those of machines are."""
-    if name not in fit.prior.shapes:
-        return True
+    """Whether the curve that was read is no larger, if it is so, than those of machines are; every curve
+    where a source reads all of them."""
+    curves = [name] if name in fit.parameters.spaces else [*fit.parameters.spaces]
+    return all(_no_larger(curve, tried.change, fit) for curve in curves)
+
+
+def _no_larger(name: str, change: Array, fit: Fit) -> bool:
     rows = fit.curve(name, grid_of(fit, name))
-    before, after = (float(np.sqrt(np.mean((rows @ x) ** 2))) for x in (fit.theta, fit.theta + tried.change))
+    before, after = (float(np.sqrt(np.mean((rows @ x) ** 2))) for x in (fit.theta, fit.theta + change))
     return after <= max(before, largest(class_of(name)))
