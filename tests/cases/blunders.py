@@ -194,8 +194,8 @@ def _of_lengths(one: Lengths) -> Iterator[What]:
 
 
 def _of_pods(one: Pods) -> Iterator[What]:
-    yield ("handedness", "", dataclasses.replace(one, azimuth_rad=-one.azimuth_rad))
-    yield ("lever", "", dataclasses.replace(one, tool_mm=one.tool_mm[:, [1, 0, 2]]))
+    yield ("handedness", "other way round", dataclasses.replace(one, azimuth_rad=-one.azimuth_rad))
+    yield ("lever", "tool vectors are swapped", dataclasses.replace(one, tool_mm=one.tool_mm[:, [1, 0, 2]]))
     baselines = tuple((i, j, 1.0002 * apart, sigma) for i, j, apart, sigma in one.baselines)
     yield ("scale", "a baseline", dataclasses.replace(one, baselines=baselines))
 

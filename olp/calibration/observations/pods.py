@@ -22,6 +22,7 @@ from olp.calibration.observations.base import (
     Advance,
     Alternative,
     Noise,
+    Observation,
     Outlier,
     Scattered,
     ScatteredState,
@@ -44,6 +45,8 @@ _STEPS = 30
 _AROUND = (-0.7, 0.5, 1.7)
 #: A pose is refused where its directions miss the nominal points by more than this (rad, rms).
 _LARGEST_MISS_RAD = 2e-3
+#: Pods stand no farther off than so many times the extent of the points.
+_DISTANCES = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,12 +101,23 @@ class Pods(Scattered):
         return int(self.azimuth_rad.shape[1])
 
     def alternatives(self) -> Sequence[Alternative]:
-        """Baselines of another length. Angles counted otherwise are refused with their convention."""
-        if not self.baselines:
-            return ()
-        loose = [(i, j, apart, math.hypot(sigma, OWN_SCALE * apart)) for i, j, apart, sigma in self.baselines]
-        words = "a baseline between its pods has another length than stated, or temperature changed it"
-        return [Alternative("scale", words, replace(self, baselines=tuple(loose)), where_off=True)]
+        """Baselines of another length, and swapped columns that leave a pose. Angles counted otherwise, and
+        other swaps, are refused with their cause."""
+        found = [one for one in self.swapped() if self._alike(one.observation)]
+        if self.baselines:
+            loose = [(i, j, mm, math.hypot(sigma, OWN_SCALE * mm)) for i, j, mm, sigma in self.baselines]
+            words = "a baseline between its pods has another length than stated, or temperature changed it"
+            other = replace(self, baselines=tuple(loose))
+            found.append(Alternative("scale", words, other, where_off=True))
+        return found
+
+    def _alike(self, other: Observation) -> bool:
+        """Whether poses may fit both these points and those of another: they differ by little but a shift."""
+        assert isinstance(other, Pods)
+        tip = self.axis_mm + self.tool_mm
+        change = other.axis_mm + other.tool_mm - tip
+        off = np.sqrt(np.mean((change - change.mean(axis=0)) ** 2))
+        return bool(off < _LARGEST_MISS_RAD * _DISTANCES * np.ptp(tip, axis=0).max())
 
     def start(self, noise: Noise | None = None) -> PodsState:
         return PodsState(self, first_poses(self))
@@ -175,14 +189,15 @@ def first_poses(pods: Pods) -> tuple[Pose, ...]:
         if miss > _LARGEST_MISS_RAD:
             raise CannotCompute(
                 f"pod {k + 1} of {pods.source or 'the pods'}: no pose fits its angles to the points"
-                + _conventions(tip, pods.azimuth_rad[:, k], pods.elevation_rad[:, k])
+                + _cause(pods, k)
             )
         poses.append(pose)
     return tuple(poses)
 
 
-def _conventions(tip: Array, azimuth: Array, elevation: Array) -> str:
-    """What to state so that a pose fits, or to check where no convention of angles makes one fit."""
+def _cause(pods: Pods, k: int) -> str:
+    """What to state or put right so that a pose of a pod fits, or what to check where that is not known."""
+    tip, azimuth, elevation = pods.axis_mm + pods.tool_mm, pods.azimuth_rad[:, k], pods.elevation_rad[:, k]
     clockwise = "azimuths counted the other way round"
     zenith = "vertical angles counted from the other zero"
     for words, turned, up in (
@@ -195,6 +210,11 @@ def _conventions(tip: Array, azimuth: Array, elevation: Array) -> str:
                 f", and one fits with {words}; state azimuth (clockwise, counter-clockwise) and vertical "
                 "(zenith, elevation) as the instrument counts them"
             )
+    for one in pods.swapped():
+        other = one.observation
+        assert isinstance(other, Pods)
+        if _resected(other.axis_mm + other.tool_mm, azimuth, elevation)[0] < 0.1 * _LARGEST_MISS_RAD:
+            return f", and one fits if {one.words}; put them right in the file or the plan"
     return "; check the angles, and that their rows are those of the points"
 
 

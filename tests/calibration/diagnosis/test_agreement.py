@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from cases.calibration import case, cloud, rays, residual_of
+from cases.calibration import case, cloud, rays, residual_of, two_pods
 from cases.fast import some_of_a_campaign
 from judge import simulated
 from judge.simulated import OFFSETS
@@ -18,7 +18,7 @@ from olp.calibration.estimator.adjustment import fit
 from olp.calibration.observations.artefact import Artefact
 from olp.calibration.observations.lines import Line
 from olp.calibration.observations.measurements import Measurements
-from olp.core.errors import ConfigError
+from olp.core.errors import CannotCompute, ConfigError
 from olp.errormodel.quality import Fitted
 from olp.workflows.calibrate_fit import fit_calibration
 
@@ -58,6 +58,18 @@ def found(seed: int, family: str, kinds: str, change: Callable[[Line], Line] | N
 
 def times(file: str, factor: float) -> Callable[[Line], Line]:
     return lambda line: dataclasses.replace(line, value=factor * line.value) if line.source == file else line
+
+
+def test_swapped_tool_vectors_of_pods_are_named_or_weighed() -> None:
+    """No pose fits swapped tool vectors that differ; a single one is as if the pods stood elsewhere."""
+    machine, _ = case(3, "smooth")
+    pods = two_pods(machine, 3, 12)
+    swapped = dataclasses.replace(pods, tool_mm=pods.tool_mm[:, [2, 1, 0]])
+    with pytest.raises(CannotCompute, match="fits if X and Z of its tool vectors are swapped"):
+        swapped.start()
+    assert {one.kind for one in swapped.alternatives()} == {"scale"}
+    single = dataclasses.replace(pods, tool_mm=pods.tool_mm[0])
+    assert {one.kind for one in single.alternatives()} == {"scale", "columns", "tool"}
 
 
 def kinds(one: Agreement) -> set[str]:
