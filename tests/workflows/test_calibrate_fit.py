@@ -329,6 +329,44 @@ def test_another_convention_of_theodolites_is_asked_for(
     assert words in str(caught.value) and "state azimuth" in str(caught.value)
 
 
+def test_points_in_other_units_and_with_decimal_commas_are_the_same(tmp_path: Path) -> None:
+    theodolite(tmp_path, "")
+    (plain,) = load_measurements([tmp_path]).of(Pods)
+    rows = [line.split(",") for line in (tmp_path / "p.csv").read_text().splitlines()[1:]]
+    factors = (1 / 25.4, 1e-3, 1.0, 1 / 0.9, np.pi / 180.0)
+    head = "X_inch;Y_m;Z_mm;azimuth_1_gon;elevation_1_rad\n"
+    cells = [[repr(float(cell) * factor) for cell, factor in zip(row, factors, strict=True)] for row in rows]
+    text = head + "".join(";".join(row) + "\n" for row in cells)
+    for written in (text, text.replace(".", ",")):
+        (tmp_path / "p.csv").write_text(written)
+        (other,) = load_measurements([tmp_path]).of(Pods)
+        assert np.allclose(other.axis_mm, plain.axis_mm, rtol=0, atol=1e-9)
+        assert np.allclose(other.azimuth_rad, plain.azimuth_rad, rtol=0, atol=1e-12)
+        assert np.allclose(other.elevation_rad, plain.elevation_rad, rtol=0, atol=1e-12)
+    for wrong, words in (
+        (text.replace(".", ",", 1), "with commas and with points"),
+        (text.replace("Y_m", "X_mm"), 'repeats "X_mm"'),
+    ):
+        (tmp_path / "p.csv").write_text(wrong)
+        with pytest.raises(ConfigError, match=words):
+            load_measurements([tmp_path])
+
+
+def test_files_of_a_folder_say_once_what_they_lack(tmp_path: Path) -> None:
+    line = "target_mm,run,direction,value_um\n0,1,1,0\n9,1,1,0\n"
+    for name in ("exx.csv", "eyy.csv"):
+        (tmp_path / name).write_text(line)
+    points = "X_inch,Y_inch,Z_inch,measured_X_mm,measured_Y_mm,measured_Z_mm\n0,0,0,0,0,0\n"
+    (tmp_path / "tracker.csv").write_text(points)
+    (tmp_path / "odd.csv").write_text("Point,Soll,Ist\n1,2,3\n")
+    with pytest.raises(ConfigError) as caught:
+        load_measurements([tmp_path])
+    together, odd, tracker = caught.value.problems
+    assert "exx.csv, eyy.csv: states no component" in together and "--propose" in together
+    assert "its columns are Point, Soll, Ist; expected target_mm" in odd
+    assert "readings of a table [[points]]" in tracker and "--propose" in tracker
+
+
 def test_a_polar_station_counts_as_the_plan_states(tmp_path: Path) -> None:
     head = "X_mm,Y_mm,Z_mm,distance_mm,azimuth_deg,elevation_deg\n"
     rows = "".join(f"{x},{y},0,{900 + x},{x / 50},{60 + y / 50}\n" for x in (0, 500, 900) for y in (0, 300))

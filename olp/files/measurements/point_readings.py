@@ -9,6 +9,9 @@ to the reflector where it differs from point to point. Other instruments have ot
 measured ones. Lengths from a station: length_mm. A polar station: distance_mm, azimuth_deg and elevation_deg.
 Directions from pods: azimuth_1_deg, elevation_1_deg, azimuth_2_deg ...
 
+Columns may be in inches, m, gon or rad: X_inch, measured_X_m, azimuth_1_gon. Semicolons may separate them,
+with a comma or a point in numbers.
+
 Measured positions may have uncertainties of their own, in the frame of their coordinates: sigma_X_um,
 sigma_Y_um, sigma_Z_um, or covariance_XX_um2, covariance_XY_um2, covariance_XZ_um2, covariance_YY_um2 ...
 """
@@ -17,7 +20,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Literal
 
@@ -30,10 +33,11 @@ from olp.core.schema import Table
 from olp.core.schema_keys import Field
 from olp.core.units import AXES, MM_PER_UM
 from olp.core.values import dataclass
-from olp.files.columns import Wanted, finite, missing, names, read_sheet, unknown
+from olp.files.columns import Wanted, decoded, finite, missing, names, read_sheet, unknown
 from olp.files.measurements.stated import stated_keys
 from olp.files.problems import Problem, config_error
 from olp.files.write import PathLike, read_bytes
+from olp.program.text.rows import CSV, Form
 
 AXIS = tuple(f"{axis}_mm" for axis in AXES)
 MEASURED = tuple(f"measured_{axis}_mm" for axis in AXES)
@@ -46,6 +50,15 @@ TOOL = tuple(f"tool_{axis}_mm" for axis in AXES)
 SIGMA = tuple(f"sigma_{axis}_um" for axis in AXES)
 COVARIANCE = tuple(
     f"covariance_{first}{second}_um2" for first, second in itertools.combinations_with_replacement(AXES, 2)
+)
+
+
+#: Units that columns may have instead: the ends of their names, and the factor between both.
+_UNITS = (
+    ("_inch", "_mm", 25.4),
+    ("_m", "_mm", 1e3),
+    ("_gon", "_deg", 0.9),
+    ("_rad", "_deg", 180.0 / math.pi),
 )
 
 
@@ -109,9 +122,11 @@ def read_point_readings(path: PathLike, measured: tuple[str, ...] = MEASURED) ->
 def parse_point_readings(data: bytes, file: str, measured: tuple[str, ...] = MEASURED) -> PointReadings:
     """As `read_point_readings`, from the bytes of the file."""
     spreads = (SIGMA, COVARIANCE) if measured == MEASURED else ()
+    form, number = _form_of(decoded(data, file), file)
     known = (*AXIS, *measured, *TOOL, *(name for group in spreads for name in group))
 
-    def header_problems(line: int, header: Sequence[str]) -> list[Problem]:
+    def header_problems(line: int, written: Sequence[str]) -> list[Problem]:
+        header = [_own_unit(name)[0] for name in written]
         some = [group for group in (TOOL, *spreads) if any(name in header for name in group)]
         wanted = (*AXIS, *measured, *(name for group in some for name in group))
         return [
@@ -120,15 +135,16 @@ def parse_point_readings(data: bytes, file: str, measured: tuple[str, ...] = MEA
         ]
 
     nothing = f"holds no points; expected {','.join((*AXIS, *measured))}"
-    sheet = read_sheet(data, file, Wanted(nothing, header_problems, _number))
+    sheet = read_sheet(data, file, Wanted(nothing, header_problems, number, form=form))
     if sheet.problems:
         raise config_error(sheet.problems, file)
-    table = sheet.table
+    header, factors = zip(*(_own_unit(name) for name in sheet.header), strict=True)
+    table = sheet.table * np.array(factors)
 
     def columns(group: Sequence[str]) -> Array:
-        return np.asarray(table[:, [sheet.header.index(name) for name in group]])
+        return np.asarray(table[:, [header.index(name) for name in group]])
 
-    spread = [group for group in spreads if group[0] in sheet.header]
+    spread = [group for group in spreads if group[0] in header]
     if len(spread) > 1:
         raise ConfigError(
             f"has columns {SIGMA[0]} and {COVARIANCE[0]}; expected one of both kinds", file=file
@@ -138,7 +154,7 @@ def parse_point_readings(data: bytes, file: str, measured: tuple[str, ...] = MEA
         file,
         columns(AXIS),
         columns(measured),
-        columns(TOOL) if TOOL[0] in sheet.header else None,
+        columns(TOOL) if TOOL[0] in header else None,
         sheet.lines,
         dict(stated_keys(sheet.text)),
         covariance,
@@ -164,6 +180,33 @@ def covariances(values: Array, lines: npt.NDArray[np.int64], file: str) -> Array
             file,
         )
     return matrix * MM_PER_UM**2
+
+
+def header_in(text: str) -> tuple[str, ...]:
+    """The names of the columns of a text, in the units that tables here have."""
+    form = _form_of(text, "")[0]
+    first = next((line for _, line in form.lines(text) if form.holds(line)), "")
+    return tuple(_own_unit(cell)[0] for cell in form.cells(first))
+
+
+def _own_unit(name: str) -> tuple[str, float]:
+    """The name of a column in the unit that tables here have, and the factor to it."""
+    for ending, own, factor in _UNITS:
+        if name.endswith(ending):
+            return name.removesuffix(ending) + own, factor
+    return name, 1.0
+
+
+def _form_of(text: str, file: str) -> tuple[Form, Callable[[str, str], tuple[float, str | None]]]:
+    """How a text separates its columns, and how it writes numbers. Raises ConfigError where that is not
+    certain: numbers with commas beside numbers with points."""
+    data = [line for _, line in CSV.lines(text) if CSV.holds(line)]
+    if not data or ";" not in data[0]:
+        return CSV, _number
+    values = "".join(data[1:])
+    if "," in values and "." in values:
+        raise ConfigError("has numbers with commas and with points; expected one of them", file=file)
+    return Form(";"), lambda name, cell: _number(name, cell.replace(",", "."))
 
 
 def _number(name: str, cell: str) -> tuple[float, str | None]:

@@ -13,25 +13,16 @@ from olp.core.errors import ConfigError, InputError
 from olp.core.machine import Machine
 from olp.core.schema import fields_of
 from olp.core.values import dataclass
-from olp.files.columns import decoded
 from olp.files.measurements.instruments.base import Instrument, SeenFile
 from olp.files.measurements.instruments.lines import LineFiles
-from olp.files.measurements.instruments.registry import INSTRUMENTS
 from olp.files.measurements.line_keys import LineKeys
 from olp.files.measurements.line_profile import LineProfile, load_line_profile, read_line
 from olp.files.measurements.point_readings import COVARIANCE, SIGMA, TOOL
-from olp.files.measurements.reader import readings_in
-from olp.files.measurements.rtl import is_stored_line, parse_rtl
+from olp.files.measurements.reader import listed, readings_in
 from olp.files.measurements.schemas import PlanFile
-from olp.files.measurements.stated import stated_keys
+from olp.files.measurements.seen import COLUMNS, STORED, Known, known_of
 from olp.files.toml_text import toml_key, toml_value
-from olp.files.write import read_bytes
-from olp.program.text.rows import CSV
 
-#: Endings of files that say their columns.
-COLUMNS = (".csv",)
-#: Endings of measured lines of which only the first states its unit.
-STORED = (".rtl", ".rta", ".rts")
 #: What stands in the place of a value that no file states.
 ASKED = "?"
 #: Keys that every line needs, and that [defaults] may hold for all of them.
@@ -44,8 +35,6 @@ _OF_ALL = ("machine", "measured", "temperature_degC")
 LINES = LineFiles()
 #: The convention of readings after their profile.
 SENSED = "actual-minus-commanded"
-#: An instrument, what a file of it shows, and the keys of its table.
-Known = tuple[Instrument[Any, Any], SeenFile, dict[str, object]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +60,10 @@ def propose(folder: Path, machine: Machine | None = None) -> Proposal:
             known.append(taken)
     if not known:
         endings = ", ".join((*COLUMNS, *STORED))
+        others = f", such as {listed(unknown)}" if unknown else ""
         raise ConfigError(
             f"holds no file of readings that says what it is; expected some of {endings}, or a profile "
-            "(olp-line-profile-1) beside files of another layout",
+            f"(olp-line-profile-1) beside files of another layout{others}",
             file=str(folder),
         )
     asked: list[str] = []
@@ -86,12 +76,9 @@ def propose(folder: Path, machine: Machine | None = None) -> Proposal:
 
 def _taken(path: Path, profiles: Mapping[str, LineProfile]) -> Known | None:
     """The instrument of a file and what it shows: by itself, or by the first profile that reads it."""
-    if path.suffix.lower() in (*COLUMNS, *STORED):
-        seen = _seen(path)
-        found = ((instrument, instrument.proposed(seen)) for instrument in INSTRUMENTS)
-        taken = next(((instrument, keys) for instrument, keys in found if keys is not None), None)
-        if taken is not None:
-            return taken[0], seen, taken[1]
+    known = known_of(path)
+    if known is not None:
+        return known
     for name, profile in profiles.items():
         try:
             readings = read_line(path, profile)
@@ -113,19 +100,6 @@ def _profiles(folder: Path) -> dict[str, LineProfile]:
         with contextlib.suppress(InputError):
             profiles[path.name] = load_line_profile(path)
     return profiles
-
-
-def _seen(path: Path) -> SeenFile:
-    data = read_bytes(path)
-    if is_stored_line(data):
-        readings = parse_rtl(data, str(path), "um")
-        stated = {key: written for key, (written, _) in readings.keys.items()}
-        own = readings.component if path.suffix.lower() == STORED[0] else None
-        return SeenFile(path.name, ("target_mm",), stated, own)
-    text = decoded(data, str(path))
-    rows = (line for _, line in CSV.lines(text) if line.strip() and not line.lstrip().startswith("#"))
-    header = tuple(cell.strip() for cell in next(rows, "").split(","))
-    return SeenFile(path.name, header, {key: written for key, (written, _) in stated_keys(text)})
 
 
 def _whole(files: Sequence[SeenFile], machine: Machine | None, asked: list[str]) -> Iterator[str]:

@@ -29,6 +29,7 @@ from olp.files.measurements.line_merging import as_line, stated_of, word
 from olp.files.measurements.line_profile import read_line
 from olp.files.measurements.readings import check_component
 from olp.files.measurements.schemas import MeasurementsFile, SquareTable
+from olp.files.measurements.seen import known_of
 from olp.files.problems import Problem, config_error, validate
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
@@ -43,6 +44,10 @@ BESIDE = (".toml", ".json", ".md", ".html", ".pdf", ".png", ".jpg", ".jpeg", ".s
 CALIBRATION = "olp-calibration-1"
 #: Keys of tables that name a file.
 _FILES = ("file", "profile", "certificate")
+#: What to do where comments do not describe a file.
+_A_PLAN = "a plan: olp calibrate fit FOLDER --propose PLAN.toml writes one"
+#: Files that a sentence lists, at most.
+_LISTED = 6
 
 
 @dataclass(slots=True)
@@ -167,6 +172,12 @@ def _made(path: FilePath) -> Iterator[str]:
                     yield from (str(table[key]) for key in _FILES if key in table)
 
 
+def listed(files: Sequence[str]) -> str:
+    """The first files by name, and how many more there are."""
+    more = len(files) - _LISTED
+    return ", ".join(files[:_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
 # -- plans -----------------------------------------------------------------------------------------------
 
 
@@ -239,10 +250,31 @@ def _readings(
 def _folder(folder: FilePath, gathered: _Gathered) -> None:
     files = _alone_in(folder)
     if not files:
-        sentence = f"holds neither {PLAN} nor files {' or '.join(ALONE)}; expected one of them"
+        others = [path.name for path in readings_in(folder)]
+        what = (
+            f"; {listed(others)}: other layouts need a profile (olp-line-profile-1) and a plan"
+            if others
+            else ""
+        )
+        sentence = f"holds neither {PLAN} nor files {' or '.join(ALONE)}; expected one of them{what}"
         gathered.errors.append(ConfigError(sentence, file=str(folder)))
+    known = len(gathered.errors)
     for path in files:
         _alone(path, gathered)
+    gathered.errors[known:] = _joined(gathered.errors[known:], folder)
+
+
+def _joined(errors: Sequence[ConfigError], folder: FilePath) -> Iterator[ConfigError]:
+    """Each sentence once, with the files that it is about."""
+    files: dict[tuple[str, ...], list[ConfigError]] = {}
+    for error in errors:
+        files.setdefault(error.problems, []).append(error)
+    for problems, alike in files.items():
+        if len(alike) == 1:
+            yield alike[0]
+            continue
+        sentence = f"{listed([FilePath(str(error.file)).name for error in alike])}: {problems[0]}"
+        yield ConfigError(sentence, file=str(folder), problems=(sentence, *problems[1:]))
 
 
 def _alone_in(folder: FilePath) -> list[FilePath]:
@@ -251,14 +283,12 @@ def _alone_in(folder: FilePath) -> list[FilePath]:
 
 def _alone(path: FilePath, gathered: _Gathered) -> None:
     try:
+        _is_a_line(path)
         readings = read_line(path)
         stated, key_lines = stated_of(readings.keys, str(path))
         component = stated.component or readings.component
         if component is None:
-            sentence = (
-                'states no component; expected a comment such as # component = "EXX", or a plan: --propose '
-                "writes one for a folder"
-            )
+            sentence = f'states no component; expected a comment such as # component = "EXX", or {_A_PLAN}'
             raise ConfigError(sentence, file=str(path))
         check_component(readings, component)
         line = as_line(readings, component, stated, "Z", gathered.chain, str(path))
@@ -276,6 +306,14 @@ def _alone(path: FilePath, gathered: _Gathered) -> None:
         if gathered.squares.setdefault(stated.square, square) != square:
             sentence = f'square "{stated.square}" has other values in another file; expected the same'
             gathered.errors.append(config_error([(key_lines.get("square"), sentence)], str(path)))
+
+
+def _is_a_line(path: FilePath) -> None:
+    """Raise ConfigError for a file of another instrument."""
+    known = known_of(path)
+    if known is not None and known[0].key != "lines":
+        sentence = f"holds readings of a table [[{known[0].key}]], which comments do not describe; expected"
+        raise ConfigError(f"{sentence} {_A_PLAN}", file=str(path))
 
 
 def _square(table: SquareTable) -> Square:

@@ -59,6 +59,8 @@ UNITS: Mapping[str, float] = MappingProxyType(
 #: Units of angles.
 ANGULAR = frozenset({"rad", "mrad", "urad", "arcsec", "um/m", "mm/m"})
 
+#: Columns that a sentence lists, at most.
+_LISTED = 6
 _HEADER = ("target_mm", "run", "direction")
 _VALUES = {"value_um": "um", "value_urad": "urad"}
 #: Columns of the environment of a laser: of its air, all or none, and of the material.
@@ -161,6 +163,10 @@ def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
         sentence = "columns are separated by semicolons or tabs; expected commas, or a profile for this file"
         return [(line, sentence)]
     more = "; files of other instruments need a profile"
+    if not {*header} & {*known}:
+        shown = ", ".join(header[:_LISTED]) + (" ..." if len(header) > _LISTED else "")
+        wanted = ", ".join((*_HEADER, *[*_VALUES][:1]))
+        return [(line, f"its columns are {shown}; expected {wanted}, as of a line{more}")]
     problems = names(line, header, lambda _, name: None if _is_sensor(name) else unknown(name, known, more))
     air = AIR if any(name in header for name in AIR) else ()
     problems += missing(line, header, (*_HEADER, *air))
