@@ -91,6 +91,8 @@ def _counted(one: Blunder, said: Outcome) -> Iterator[str]:
     if not said.alarms:
         yield f"{loud}{checked}, silent"
         yield f"silent, harm {'told' if said.told else 'not told'} beforehand"
+        if said.silent and not (said.told and said.redundancy < CHECKED):
+            yield "against the bar: loud, silent, and checked or not told"
     if said.loud and one.words:
         yield "loud, can be named"
         if said.named:
@@ -99,7 +101,7 @@ def _counted(one: Blunder, said: Outcome) -> Iterator[str]:
 
 def _words(one: Blunder, said: Outcome) -> str:
     if said.silent:
-        return "SILENT" if said.told else "SILENT, NOT TOLD"
+        return "SILENT, TOLD" if said.told and said.redundancy < CHECKED else "SILENT, AGAINST THE BAR"
     if not said.alarms:
         return "" if said.told else "not told"
     return "not named" if said.loud and one.words and not said.named else ""
