@@ -13,6 +13,8 @@ from olp.reports.shown import unit_in
 
 Summary = Mapping[str, Any]
 
+#: Smaller numbers are rounding: no unit of a report is so large.
+_ROUNDING = 1e-8
 #: Titles of keys whose words are not those of the shop floor.
 _TITLES = {"lost_motion_um": "backlash um"}
 
@@ -104,9 +106,9 @@ def _text(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        if 0.0 < abs(value) < 5e-4:
+        if _ROUNDING < abs(value) < 5e-4:
             return f"{value:.1e}"
-        return f"{value:.3f}".rstrip("0").rstrip(".") if value else "0"
+        return f"{value:.3f}".rstrip("0").rstrip(".") if abs(value) > _ROUNDING else "0"
     if isinstance(value, list | tuple | set | frozenset):
         return ", ".join(map(_text, value))
     return printable(str(value))

@@ -10,6 +10,7 @@ from typing import Any
 
 from olp.calibration.diagnosis.agreement import compared
 from olp.calibration.diagnosis.agreement_report import agreement_findings, agreement_rows
+from olp.calibration.diagnosis.apart import targets_apart
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.covariance import covariance_of
 from olp.calibration.estimator.curves import calibration_of, sigmas_of
@@ -131,7 +132,8 @@ def fit_calibration(
     tools = [] if described is None else [tool.tool_vector_mm for tool in described.tools.values()]
     tool_vectors = [tool_vector for tool_vector in tools if tool_vector is not None]
     findings = (
-        *findings_of(fitted, tool_vectors, travel), *agreement_findings(found, fitted, tool_vectors),
+        *findings_of(fitted, tool_vectors, travel), *targets_apart(fitted),
+        *agreement_findings(found, fitted, tool_vectors),
         *([Finding("OLP862", f"not read: {', '.join(left)}")] if left else []),
     )  # fmt: skip
     _refuse_absurd(fitted, findings)

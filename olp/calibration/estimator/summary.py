@@ -220,7 +220,8 @@ def _square_row(fit: Fit, name: str) -> dict[str, Any]:
     for key, row in (("", fit.squareness(name)), ("mid_box_", middle)):
         values[f"{key}value_urad"] = float(row @ fit.theta) / RAD_PER_URAD
         values[f"{key}sigma_urad"] = math.sqrt(max(float(row @ fit.covariance @ row), 0.0)) / RAD_PER_URAD
-    return {"name": name, **values, "in_the_middle": lean_words(name, float(middle @ fit.theta))}
+    mid = (values[f"mid_box_{key}_urad"] * RAD_PER_URAD for key in ("value", "sigma"))
+    return {"name": name, **values, "in_the_middle": lean_words(name, *mid)}
 
 
 def _artefacts(fit: Fit) -> dict[str, Any]:

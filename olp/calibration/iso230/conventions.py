@@ -71,15 +71,13 @@ def angle_words(component: str, value_rad: float) -> str:
     return f"{first} to {second}: 90 deg {'-' if more < 0 else '+'} {abs(more):.2f} urad"
 
 
-def lean_words(component: str, value_rad: float) -> str:
-    """To which side the later axis leans, such as "Y leans to +X"."""
+def lean_words(component: str, value_rad: float, sigma_rad: float) -> str:
+    """To which side the later axis leans, such as "Y leans to +X", where its expanded uncertainty (k = 2)
+    leaves no doubt."""
     first, second = ("XYZ"[i] for i in AXES_OF[component])
-    lean = LEAN[component] * value_rad
-    return (
-        f"{second} leans to {'-' if lean < 0 else '+'}{first}"
-        if lean
-        else f"{second} does not lean to {first}"
-    )
+    if abs(value_rad) <= 2.0 * sigma_rad:
+        return f"{second} to {first}: side not certain"
+    return f"{second} leans to {'-' if LEAN[component] * value_rad < 0 else '+'}{first}"
 
 
 def _factor(component: str, convention: str) -> float:

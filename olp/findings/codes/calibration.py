@@ -127,6 +127,16 @@ RULES = (
         "A laser line along X, and no other reading that shows the scale of X.",
     ),
     _rule(
+        "OLP813",
+        "targets of lines far apart",
+        Severity.INFO,
+        "Between their targets these curves may be off by far more than at them, as "
+        "machines have waves, steps and kinks there. The calibration states this uncertainty.",
+        "Read more targets rather than more runs. `olp calibrate plan --next N --instrument targets "
+        "--calibration CALIBRATION` names them.",
+        "A scale of 3 m with 7 targets: 0.3 um at them, 5 um between them.",
+    ),
+    _rule(
         "OLP841",
         "errors beyond the rigid-body model",
         Severity.INFO,
