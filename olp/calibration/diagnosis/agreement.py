@@ -302,10 +302,8 @@ def _agreements(fit: Fit, sources: list[_Source]) -> tuple[Agreement, ...]:
         z = views[0].others.z(source)
         misfit = Fitted(label, float(z @ z), float(len(z)))
         as_read = _heard(views, source, _ALIKE, np.zeros(0, np.int64))
-        tried = sorted(
-            (_tried(fit, views, one, as_read, _curve(fit, source), off=misfit.failed) for one in tries),
-            key=lambda one: -one.log_odds,
-        )
+        tried = [_tried(fit, views, one, as_read, _curve(fit, source), off=misfit.failed) for one in tries]
+        tried = sorted([*tried, _of_another(fit, views[-1], as_read)], key=lambda one: -one.log_odds)
         found.append(Agreement(label, component, misfit, tuple(tried), -as_read.support))
     return tuple(found)
 
@@ -389,6 +387,14 @@ def _tried(
     change[views[0].others.columns] = heard.mean - as_read.mean
     log_odds = heard.support - as_read.support
     return Tried(one.kind, one.words, log_odds, heard.support, off or not one.where_off, change)
+
+
+def _of_another(fit: Fit, view: _Views, as_read: _Heard) -> Tried:
+    """That a source says nothing of this machine: the others alone are right. It is listed, and never
+    named."""
+    change = np.zeros(fit.parameters.size)
+    change[view.others.columns] = view.others.mean - as_read.mean
+    return Tried("machine", "it is of another machine", -as_read.support, 0.0, sought=False, change=change)
 
 
 def _curve(fit: Fit, source: _Source) -> Index:

@@ -118,11 +118,11 @@ RULES = (
         "OLP812",
         "no other reading excludes a mistake of a source",
         Severity.INFO,
-        "If such a source has this mistake, such as a wrong sign, unit or place, no reading shows it. Then "
-        "the errors are others by up to the stated amount, in the box and with the tools of the machine, or "
-        "those of the readings where none are stated. Of all mistakes that are not excluded, the one with "
-        "the largest harm is stated. On machines of any joints each is, with what it does to tips at the "
-        "postures of the readings, in the best frame.",
+        "If such a source has this mistake, such as a wrong sign, unit or place, or is of another machine, "
+        "no reading shows it. Then the errors are others by up to the stated amount, in the box and with the "
+        "tools of the machine, or those of the readings where none are stated. Of all mistakes that are not "
+        "excluded, the one with the largest harm is stated. On machines of any joints each is, with what it "
+        "does to tips at the postures of the readings, in the best frame.",
         "Measure some points or diagonals that depend on it, or check the sign once with a measured program.",
         "A laser line along X, and no other reading that shows the scale of X.",
     ),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from cases.calibration import case, cloud, rays, residual_of, two_pods
+from cases.calibration import case, cloud, measurements_of, rays, residual_of, two_pods
 from cases.fast import some_of_a_campaign
 from judge import simulated
 from judge.simulated import OFFSETS
@@ -58,6 +58,21 @@ def found(seed: int, family: str, kinds: str, change: Callable[[Line], Line] | N
 
 def times(file: str, factor: float) -> Callable[[Line], Line]:
     return lambda line: dataclasses.replace(line, value=factor * line.value) if line.source == file else line
+
+
+def test_a_line_that_nothing_checks_may_be_of_another_machine() -> None:
+    """What the report states of it is then what the line says; and it is never named."""
+    machine = simulated.machine(11, "smooth")
+    taken = simulated.take(machine, np.random.default_rng(2), "EXX", targets=np.linspace(0.0, 3000.0, 13))
+    fitted = fit(measurements_of([taken]), machine.chain, travel_mm=machine.box.tolist())
+    outcome = compared(fitted)
+    (one,) = outcome.sources
+    assert "machine" in kinds(one) and not outcome.wrong
+    alone = dataclasses.replace(one, tried=tuple(tried for tried in one.tried if tried.kind == "machine"))
+    (row,) = agreement_rows(Compared((alone,), (), ()), fitted, [(0.0, 0.0, -120.0)])
+    q = np.linspace(0.0, 3000.0, 300)
+    most = 1e3 * np.abs(fitted.curve("EXX", q) @ fitted.theta).max()
+    assert row["hidden_harm_um"] == pytest.approx(most, rel=0.05)
 
 
 def test_swapped_tool_vectors_of_pods_are_named_or_weighed() -> None:
