@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -78,13 +78,20 @@ class Tried:
 class Agreement:
     """A source against all others: `misfit` is the sum of z^2 over as many directions as freedom, `tried` is
     what may be wrong with it, the most probable first. `against` is the log odds (nats) that it says nothing
-    of this machine."""
+    of this machine. `rivals` are the names of sources of which one is wrong as probably instead."""
 
     label: str
     component: str
     misfit: Fitted
     tried: tuple[Tried, ...]
     against: float
+    rivals: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Its file, and the component that it reads."""
+        other = self.component and self.component != self.label
+        return f"{self.label} ({self.component})" if other else self.label
 
     @property
     def named(self) -> Tried | None:
@@ -235,7 +242,10 @@ def compared(fit: Fit, states: Sequence[State] | None = None) -> Compared:
             break
         left.discard(index)
         if found is None:
-            unlike.append(now[index])
+            alike = [index, *(k for k in sorted(left) if _as_doubtful(now[k], now[index]))]
+            left.difference_update(alike)
+            for k in alike:
+                unlike.append(replace(now[k], rivals=tuple(now[j].name for j in alike if j != k)))
             sources[index] = _Source.of(sources[index].state, Normal.of(fit.parameters.size))
         else:
             wrong.append(now[index])
@@ -260,6 +270,12 @@ def _worst(now: tuple[Agreement, ...], left: set[int]) -> tuple[int, Tried | Non
     if best >= 0 and named[best].log_odds > _EXPLAINS * most:
         return best, named[best]
     return (int(np.argmax(against)), None) if np.isfinite(most) else (-1, None)
+
+
+def _as_doubtful(one: Agreement, worst: Agreement) -> bool:
+    """Whether a source may be the wrong one as well, as where two contradict each other and nothing else
+    tells which."""
+    return one.contradicts and one.against > worst.against - EXCLUDED
 
 
 def _put_right(fit: Fit, source: _Source, words: str) -> _Source:

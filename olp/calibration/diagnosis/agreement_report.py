@@ -33,19 +33,18 @@ def agreement_findings(found: Compared, fit: Fit, tools: Sequence[Vector]) -> It
         assert one.named is not None
         yield Finding(
             "OLP810",
-            f"{_name(one)}: {one.causes}; so it agrees with all other readings, with odds of "
+            f"{one.name}: {one.causes}; so it agrees with all other readings, with odds of "
             f"10^{one.named.log_odds / math.log(10.0):.0f} to 1",
         )
     for one in found.unlike:
         yield Finding(
             "OLP811",
-            f"{_name(one)}: it differs from what all other readings say by "
+            f"{one.name}: it differs from what all other readings say by "
             f"{math.sqrt(one.misfit.reduced):.1f} times what both uncertainties explain"
-            + (f"; it may be that {one.likely}, which they do not confirm" if one.likely else ""),
+            + (f"; it may be that {one.likely}, which they do not confirm" if one.likely else "")
+            + (f"; or {' or '.join(one.rivals)} is wrong instead, as probably" if one.rivals else ""),
         )
-    costs = sorted(
-        ((harm, _name(one), kind) for one, (harm, kind) in _harms(found, fit, tools)), reverse=True
-    )
+    costs = sorted(((harm, one.name, kind) for one, (harm, kind) in _harms(found, fit, tools)), reverse=True)
     costs = [cost for cost in costs if cost[0] > _LEAST_UM]
     if costs:
         words = ", ".join(f"{name} {harm:.3g} um ({kind})" for harm, name, kind in costs[:_LISTED])
@@ -69,10 +68,6 @@ def agreement_rows(found: Compared, fit: Fit, tools: Sequence[Vector]) -> list[d
         }
         for one, (harm, _) in _harms(found, fit, tools)
     ]
-
-
-def _name(one: Agreement) -> str:
-    return f"{one.label} ({one.component})" if one.component and one.component != one.label else one.label
 
 
 def _harms(

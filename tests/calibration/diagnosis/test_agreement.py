@@ -75,6 +75,24 @@ def test_a_line_that_nothing_checks_may_be_of_another_machine() -> None:
     assert row["hidden_harm_um"] == pytest.approx(most, rel=0.05)
 
 
+def test_of_two_that_contradict_each_other_both_are_named() -> None:
+    """A line of EAX stated as EBX, beside that of EBX: nothing tells which of both is which."""
+    machine, rng = simulated.machine(11, "smooth"), np.random.default_rng(2)
+    q = np.linspace(0.0, 3000.0, 13)
+    both = [simulated.take(machine, rng, name, targets=q) for name in ("EAX", "EBX")]
+    taken = measurements_of([dataclasses.replace(one, component="EBX") for one in both])
+    lines = tuple(dataclasses.replace(line, source=f"{k}.csv") for k, line in enumerate(taken.lines))
+    taken = dataclasses.replace(taken, observations=lines)
+    fitted = fit(taken, machine.chain, travel_mm=machine.box.tolist())
+    messages = [
+        one.message for one in agreement_findings(compared(fitted), fitted, []) if one.code == "OLP811"
+    ]
+    assert len(messages) == 2
+    for name, other in ("01", "10"):
+        (own,) = (words for words in messages if words.startswith(f"{name}.csv"))
+        assert f"or {other}.csv (EBX) is wrong instead" in own
+
+
 def test_swapped_tool_vectors_of_pods_are_named_or_weighed() -> None:
     """No pose fits swapped tool vectors that differ; a single one is as if the pods stood elsewhere."""
     machine, _ = case(3, "smooth")
