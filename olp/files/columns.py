@@ -12,13 +12,15 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from olp.core.arrays import Array, Index
-from olp.core.errors import InputError
+from olp.core.errors import ConfigError, InputError
 from olp.core.values import dataclass
 from olp.files.fields import nearest
 from olp.files.problems import Problem, config_error
 from olp.program.text import rows
 from olp.program.text.rows import CSV, Form, place_of
 
+#: How text in UTF-16 begins.
+_UTF_16 = b"\xff\xfe", b"\xfe\xff"
 #: A data row: its line in the file and the number in each column.
 Row = tuple[int, list[float]]
 #: A data row as it is written.
@@ -107,6 +109,20 @@ def decoded(data: bytes, file: str) -> str:
         return rows.decoded(data)
     except InputError as error:
         raise config_error([(error.line, error.message)], file) from None
+
+
+def instrument_text(data: bytes, file: str) -> str:
+    """The text of a file that the program of an instrument wrote: UTF-8, UTF-16 with its mark, or
+    Windows-1252. Code pages of one byte differ in letters beyond ASCII, and in no number. Raises ConfigError
+    where it is no text."""
+    if data[:2] in _UTF_16:
+        return data.decode("utf-16", errors="replace")
+    try:
+        return decoded(data, file)
+    except ConfigError:
+        if b"\0" in data:
+            raise
+        return data.decode("cp1252", errors="replace")
 
 
 def finite(cell: str) -> float:

@@ -28,7 +28,7 @@ from olp.core.errors import InputError
 from olp.core.machine import COMPONENTS
 from olp.core.schema import Table, Text
 from olp.core.schema_keys import Field, Known, refusal, rule
-from olp.files.columns import decoded, place_in
+from olp.files.columns import instrument_text, place_in
 from olp.files.measurements.line_runs import columns_as_runs, counted, trend, turns
 from olp.files.measurements.readings import ANGULAR, SENSES, UNITS, Readings, parse_readings
 from olp.files.measurements.renishaw import MARK, RTX, RecordingTable, line_of_recording, parse_rtx, read_rtx
@@ -227,7 +227,7 @@ def parse_line(data: bytes, file: str, profile: LineProfile) -> Readings:
     """Readings from the bytes of a text file, by a profile with [columns]."""
     if profile.columns is None:
         raise InputError("the profile has no table [columns]; expected target and value in it", file=file)
-    header, rows = _lines(decoded(data, file), profile)
+    header, rows = _lines(instrument_text(data, file), profile)
     hint = "; check header_lines and delimiter of the profile"
     cells = {key: place_in(header, column, file, hint) for key, column in _wanted(profile.columns)}
     values = [key for key in cells if key.startswith("value")]

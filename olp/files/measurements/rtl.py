@@ -23,7 +23,7 @@ import numpy as np
 from olp.core.arrays import Index
 from olp.core.errors import InputError
 from olp.core.units import AXES
-from olp.files.columns import decoded, finite
+from olp.files.columns import finite, instrument_text
 from olp.files.measurements.line_runs import counted, trend
 from olp.files.measurements.readings import ANGULAR, UNITS, Readings
 from olp.files.problems import Problem, config_error
@@ -51,7 +51,7 @@ def parse_rtl(data: bytes, file: str, unit: str | None = None) -> Readings:
     are taken where the file states them. Raises InputError where the unit is not known or the file is cut
     off, ConfigError with every problem and its line.
     """
-    sections = _sections(decoded(data, file))
+    sections = _sections(instrument_text(data, file))
     if "TARGET DATA" not in sections:
         raise InputError(
             'has no section "TARGET DATA::"; expected a measured line as Renishaw stores it, or text columns '

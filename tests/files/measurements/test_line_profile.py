@@ -207,3 +207,13 @@ def test_the_command_shows_what_is_understood(tmp_path: Path) -> None:
     as_json = CliRunner().invoke(main, ["calibrate", "read", str(tmp_path / "a.csv"), "--json"])
     got = [row["value_um"] for row in json.loads(as_json.stdout)["readings"]]
     assert got == [1.25, -2.0] == (parse_readings(native, "a").value * 1e3).tolist()
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+def test_the_encoding_of_an_instrument_changes_no_reading(encoding: str) -> None:
+    text = "Prüfer: Müller\nSoll [mm];Abweichung [µm]\n0,0;1,5\n100,0;-2,5\n"
+    columns = {"target": "Soll [mm]", "value": "Abweichung [µm]"}
+    layout = profile(delimiter="semicolon", decimal="comma", header_lines=1, columns=columns)
+    readings = parse_line(text.encode(encoding), "x.txt", layout)
+    assert readings.target_mm.tolist() == [0.0, 100.0]
+    assert np.allclose(readings.value, [0.0015, -0.0025])
