@@ -179,8 +179,11 @@ def _propose(data: tuple[str, ...], machine: str | None, target: str, *, force: 
             f"names of files in a plan are relative to it; expected a file in {data[0]}", file=target
         )
     proposal = propose(Path(data[0]), None if machine is None else load_machine(machine))
-    write_files({Path(target): proposal.text.encode()}, force=force, inputs=files_of(machine))
-    diagnostic(f"wrote {target}")
+    files = {Path(target): proposal.text.encode()}
+    files |= {Path(target).parent / name: text.encode() for name, text in proposal.layouts.items()}
+    write_files(files, force=force, inputs=files_of(machine))
+    for path in files:
+        diagnostic(f"wrote {path}")
     for question in proposal.asked:
         diagnostic(f"asked for {question}")
     for name in proposal.unknown:

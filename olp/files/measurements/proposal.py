@@ -4,8 +4,10 @@ what no file says is asked for."""
 from __future__ import annotations
 
 import contextlib
+import itertools
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -13,18 +15,19 @@ from olp.core.errors import ConfigError, InputError
 from olp.core.machine import Machine
 from olp.core.schema import fields_of
 from olp.core.values import dataclass
+from olp.files.columns import instrument_text
 from olp.files.measurements.instruments.base import Instrument, SeenFile
 from olp.files.measurements.instruments.lines import LineFiles
+from olp.files.measurements.layout_draft import ASKED, drafted
 from olp.files.measurements.line_keys import LineKeys
-from olp.files.measurements.line_profile import LineProfile, load_line_profile, read_line
+from olp.files.measurements.line_profile import LineColumns, LineProfile, load_line_profile, read_line
 from olp.files.measurements.point_readings import COVARIANCE, SIGMA, TOOL
 from olp.files.measurements.reader import listed, readings_in
 from olp.files.measurements.schemas import PlanFile
 from olp.files.measurements.seen import COLUMNS, STORED, Known, known_of
-from olp.files.toml_text import toml_key, toml_value
+from olp.files.toml_text import toml_document, toml_key, toml_value
+from olp.files.write import read_bytes
 
-#: What stands in the place of a value that no file states.
-ASKED = "?"
 #: Keys that every line needs, and that [defaults] may hold for all of them.
 _OF_LINES = ("sense", "line_mm", "tool_mm")
 #: Columns that state for each row what a key states for all of them.
@@ -39,11 +42,13 @@ SENSED = "actual-minus-commanded"
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """The text of a plan (olp-measurements-1), what is asked for in it, and the files that are not known."""
+    """The text of a plan (olp-measurements-1), what is asked for in it, and the files that are not known.
+    `layouts` are profiles (olp-line-profile-1) that are drafted for files of other layouts, by name."""
 
     text: str
     asked: tuple[str, ...]
     unknown: tuple[str, ...]
+    layouts: Mapping[str, str] = field(default_factory=dict)
 
 
 def propose(folder: Path, machine: Machine | None = None) -> Proposal:
@@ -51,9 +56,11 @@ def propose(folder: Path, machine: Machine | None = None) -> Proposal:
     none is known."""
     known: list[Known] = []
     unknown: list[str] = []
+    asked: list[str] = []
+    layouts: dict[str, str] = {}
     profiles = _profiles(folder)
     for path in readings_in(folder):
-        taken = _taken(path, profiles)
+        taken = _taken(path, profiles) or _drafted(path, layouts, asked)
         if taken is None:
             unknown.append(path.name)
         else:
@@ -66,12 +73,11 @@ def propose(folder: Path, machine: Machine | None = None) -> Proposal:
             f"(olp-line-profile-1) beside files of another layout{others}",
             file=str(folder),
         )
-    asked: list[str] = []
     lines = [*_whole([seen for _, seen, _ in known], machine, asked), ""]
     lines += _defaults([seen for instrument, seen, _ in known if instrument.key == "lines"], asked)
     for instrument, seen, keys in known:
         lines += ["", f"[[{instrument.key}]]", *_table(instrument, seen, keys, asked)]
-    return Proposal("\n".join(lines) + "\n", tuple(asked), tuple(unknown))
+    return Proposal("\n".join(lines) + "\n", tuple(asked), tuple(unknown), layouts)
 
 
 def _taken(path: Path, profiles: Mapping[str, LineProfile]) -> Known | None:
@@ -91,6 +97,33 @@ def _taken(path: Path, profiles: Mapping[str, LineProfile]) -> Known | None:
         seen = SeenFile(path.name, ("target_mm", value), stated, readings.component)
         return LINES, seen, {**(LINES.proposed(seen) or {}), "profile": name}
     return None
+
+
+def _drafted(path: Path, layouts: dict[str, str], asked: list[str]) -> Known | None:
+    """A file of two columns of numbers as a line, with a profile that is drafted: one for all that are laid
+    out alike."""
+    try:
+        keys = drafted(instrument_text(read_bytes(path), str(path)))
+    except InputError:
+        keys = None
+    if keys is None:
+        return None
+    columns = keys.pop("columns")
+    assert isinstance(columns, Mapping)
+    text = "# Drafted from a file. Check it, and replace each question mark.\n"
+    text += toml_document([("", keys), ("[columns]", columns)])
+    name = next((name for name, other in layouts.items() if other == text), None)
+    if name is None:
+        numbers = (f"layout-{number}.toml" for number in itertools.count(1))
+        name = next(one for one in numbers if one not in layouts and not (path.parent / one).exists())
+        layouts[name] = text
+        models = (LineProfile, keys), (LineColumns, columns)
+        asked += [
+            f"{key} of {name}: {fields_of(model)[key].description}"
+            for model, stated in models for key, value in stated.items() if value == ASKED
+        ]  # fmt: skip
+    seen = SeenFile(path.name, ("target_mm",), {})
+    return LINES, seen, {**(LINES.proposed(seen) or {}), "profile": name}
 
 
 def _profiles(folder: Path) -> dict[str, LineProfile]:
