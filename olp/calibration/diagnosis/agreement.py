@@ -78,7 +78,8 @@ class Tried:
 class Agreement:
     """A source against all others: `misfit` is the sum of z^2 over as many directions as freedom, `tried` is
     what may be wrong with it, the most probable first. `against` is the log odds (nats) that it says nothing
-    of this machine. `rivals` are the names of sources of which one is wrong as probably instead."""
+    of this machine. `rivals` are the names of sources of which one is wrong as probably instead, `number` is
+    its place among all sources."""
 
     label: str
     component: str
@@ -86,6 +87,7 @@ class Agreement:
     tried: tuple[Tried, ...]
     against: float
     rivals: tuple[str, ...] = ()
+    number: int = 0
 
     @property
     def name(self) -> str:
@@ -304,11 +306,11 @@ def _agreements(fit: Fit, sources: list[_Source]) -> tuple[Agreement, ...]:
         ]
 
     found = []
-    for source in sources:
+    for number, source in enumerate(sources):
         label, component = source.state.label, source.state.component
         if not len(source.columns):
             # it was left out
-            found.append(Agreement(label, component, Fitted(label, 0.0, 0.0), (), 0.0))
+            found.append(Agreement(label, component, Fitted(label, 0.0, 0.0), (), 0.0, (), number))
             continue
         tries = tuple(_alternatives(fit, source))
         # another component depends on other unknowns; and all of a curve, whatever part of it was read: its
@@ -320,7 +322,7 @@ def _agreements(fit: Fit, sources: list[_Source]) -> tuple[Agreement, ...]:
         as_read = _heard(views, source, _ALIKE, np.zeros(0, np.int64))
         tried = [_tried(fit, views, one, as_read, _curve(fit, source), off=misfit.failed) for one in tries]
         tried = sorted([*tried, _of_another(fit, views[-1], as_read)], key=lambda one: -one.log_odds)
-        found.append(Agreement(label, component, misfit, tuple(tried), -as_read.support))
+        found.append(Agreement(label, component, misfit, tuple(tried), -as_read.support, (), number))
     return tuple(found)
 
 

@@ -44,8 +44,11 @@ def agreement_findings(found: Compared, fit: Fit, tools: Sequence[Vector]) -> It
             + (f"; it may be that {one.likely}, which they do not confirm" if one.likely else "")
             + (f"; or {' or '.join(one.rivals)} is wrong instead, as probably" if one.rivals else ""),
         )
-    costs = sorted(((harm, one.name, kind) for one, (harm, kind) in _harms(found, fit, tools)), reverse=True)
-    costs = [cost for cost in costs if cost[0] > _LEAST_UM]
+    told = {one.number for one in (*found.wrong, *found.unlike)}
+    harms = [
+        (harm, one.name, kind) for one, (harm, kind) in _harms(found, fit, tools) if one.number not in told
+    ]
+    costs = sorted((cost for cost in harms if cost[0] > _LEAST_UM), reverse=True)
     if costs:
         words = ", ".join(f"{name} {harm:.3g} um ({kind})" for harm, name, kind in costs[:_LISTED])
         more = f" and {len(costs) - _LISTED} more" if len(costs) > _LISTED else ""
@@ -54,14 +57,14 @@ def agreement_findings(found: Compared, fit: Fit, tools: Sequence[Vector]) -> It
 
 def agreement_rows(found: Compared, fit: Fit, tools: Sequence[Vector]) -> list[dict[str, Any]]:
     """One row a source: how it agrees with the others, what they do not exclude, and what that could cost."""
-    wrong = {id(one.misfit): one for one in found.wrong}
+    wrong = {one.number: one for one in found.wrong}
     return [
         {
             "file": one.label,
             "name": one.component,
             "directions": int(one.misfit.freedom),
             "chi_square_per_direction": one.misfit.reduced,
-            "wrong": one.causes if id(one.misfit) in wrong else "",
+            "wrong": wrong[one.number].causes if one.number in wrong else "",
             "log10_odds_of_a_mistake": one.doubt / math.log(10.0) if np.isfinite(one.doubt) else None,
             "not_excluded": ", ".join(sorted({tried.kind for tried in _open(one, fit)})),
             "hidden_harm_um": harm,
