@@ -169,6 +169,7 @@ def _of_joints(
 def _propose(data: tuple[str, ...], machine: str | None, target: str, *, force: bool) -> None:
     """Write the plan that the files of a folder propose, and say what is asked for."""
     from olp.files.config import load_machine
+    from olp.files.measurements.line_profile import WITHOUT_GRAMMAR
     from olp.files.measurements.proposal import propose
     from olp.files.write import write_files
 
@@ -187,4 +188,6 @@ def _propose(data: tuple[str, ...], machine: str | None, target: str, *, force: 
     for question in proposal.asked:
         diagnostic(f"asked for {question}")
     for name in proposal.unknown:
-        diagnostic(f"not known: {name}; describe its columns with a profile, and name it in the plan")
+        format_ = WITHOUT_GRAMMAR.get(Path(name).suffix.lower())
+        what = f"it is {format_} by its name, which is not public; export text, and " if format_ else ""
+        diagnostic(f"not known: {name}; {what}describe its columns with a profile, and name it in the plan")

@@ -20,7 +20,13 @@ from olp.files.measurements.instruments.base import Instrument, SeenFile
 from olp.files.measurements.instruments.lines import LineFiles
 from olp.files.measurements.layout_draft import ASKED, drafted
 from olp.files.measurements.line_keys import LineKeys
-from olp.files.measurements.line_profile import LineColumns, LineProfile, load_line_profile, read_line
+from olp.files.measurements.line_profile import (
+    WITHOUT_GRAMMAR,
+    LineColumns,
+    LineProfile,
+    load_line_profile,
+    read_line,
+)
 from olp.files.measurements.point_readings import COVARIANCE, SIGMA, TOOL
 from olp.files.measurements.reader import listed, readings_in
 from olp.files.measurements.schemas import PlanFile
@@ -101,7 +107,9 @@ def _taken(path: Path, profiles: Mapping[str, LineProfile]) -> Known | None:
 
 def _drafted(path: Path, layouts: dict[str, str], asked: list[str]) -> Known | None:
     """A file of two columns of numbers as a line, with a profile that is drafted: one for all that are laid
-    out alike."""
+    out alike. None where its format is not public."""
+    if path.suffix.lower() in WITHOUT_GRAMMAR:
+        return None
     try:
         keys = drafted(instrument_text(read_bytes(path), str(path)))
     except InputError:

@@ -6,7 +6,9 @@ import itertools
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from olp.cli import main
 from olp.files.measurements.layout_draft import ASKED, drafted
 from olp.files.measurements.line_profile import LineProfile, parse_line
 from olp.files.measurements.proposal import propose
@@ -70,3 +72,13 @@ def test_files_that_are_laid_out_alike_share_a_draft(tmp_path: Path) -> None:
     assert list(proposal.layouts) == ["layout-2.toml"]
     assert proposal.text.count('profile = "layout-2.toml"') == 2 and 'component = "EYY"' in proposal.text
     assert [words for words in proposal.asked if words.startswith("unit of layout-2.toml")]
+
+
+def test_formats_that_are_not_public_are_not_drafted(tmp_path: Path) -> None:
+    (tmp_path / "exx.txt").write_text(text_of(";", ",", [], False))
+    (tmp_path / "x.pos").write_text(text_of(";", ",", [], False))
+    assert propose(tmp_path).unknown == ("x.pos",)
+    plan = str(tmp_path / "measurements.toml")
+    said = CliRunner().invoke(main, ["calibrate", "fit", str(tmp_path), "--propose", plan]).output
+    assert "not known: x.pos; it is a positioning measurement of Renishaw or Wyler" in said
+    assert f"wrote {tmp_path / 'layout-1.toml'}" in said
