@@ -83,6 +83,8 @@ def _plain(error: click.UsageError) -> str:
 
         near = difflib.get_close_matches(wanted, takes, 1, _NEAR)
         hint = f"did you mean {near[0]}?" if near else f"{path} --help lists the options"
+        if near and not near[0].startswith("-"):
+            hint = f"it goes without one: {path} {_usage(error.ctx)}"
         return f"there is no option {error.option_name}; {hint}"
     if isinstance(error, click.BadOptionUsage) and (short := _FEW.search(message)):
         if short[1] == "an":

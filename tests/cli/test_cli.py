@@ -394,3 +394,8 @@ def test_simulate_reports_as_json(tmp_path: Path) -> None:
     assert np.abs(np.array(report["range_mm"]) - [points.min(axis=0), points.max(axis=0)]).max() < 1e-6
     assert run(*words).stdout == out.read_text()
     assert run(*words, "--json", "-o", "-").exit_code == 2
+
+
+def test_an_argument_that_was_given_as_an_option_is_shown_without_one() -> None:
+    said = CliRunner().invoke(main, ["calibrate", "doctor", "a.toml", "--points", "b.csv"]).stderr
+    assert "it goes without one: olp calibrate doctor CALIBRATION POINTS.csv" in said
