@@ -284,9 +284,10 @@ def noise_of(line: Line) -> Noise:
                 steps = _apart(line, own, value, max(spread, least))
             drift = float(np.sqrt(np.mean(steps[: ramps.shape[1]] ** 2)))
     if spread is None and line.sigma <= 0.0:
+        few, runs = ("too few", "more") if several else ("no", "two")
         raise ConfigError(
-            f"line {line.component} has no repeated readings and states no sigma; expected at least two runs "
-            f"or {'sigma_urad' if line.quantity == 'angle' else 'sigma_um'}",
+            f"line {line.component} has {few} repeated readings to show their noise, and states no sigma; "
+            f"expected {runs} runs or {'sigma_urad' if line.quantity == 'angle' else 'sigma_um'}",
             file=line.source,
         )
     sigma = max(line.sigma, spread or 0.0, least)
