@@ -80,7 +80,8 @@ def _harms(
     taken over the box with all tools, those of the readings where none are known."""
     sides = [np.linspace(low, high, _LEVELS) for low, high in fit.box_mm.tolist()]
     lattice = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
-    among = np.random.default_rng(1).uniform(*fit.box_mm.T, (_AMONG, 3))
+    low, high = fit.box_mm.T
+    among = np.random.default_rng(1).uniform(low, high, (_AMONG, 3))
     position = np.concatenate([lattice, among])
     rows = np.stack([fit.design(position, np.array(tool)) for tool in tools or _read_with(fit)])
     for one in found.sources:
