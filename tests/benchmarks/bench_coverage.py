@@ -17,6 +17,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from cases import volumetric
 from cases.coverage import Scores, lines_of, volume_of
 from judge import families
 
@@ -34,19 +35,30 @@ def told(what: str, total: Scores, rms: str, seconds: float) -> None:
     )
 
 
-def main(seeds: int, names: Sequence[str]) -> None:
+def main(seeds: int, names: Sequence[str], mixtures: Sequence[str]) -> None:
     for family in names:
-        for count in TARGETS:
+        for count in () if mixtures else TARGETS:
             begin = time.process_time()
             total = Scores.of([lines_of(family, count, seed) for seed in range(seeds)])
             took = (time.process_time() - begin) / seeds
             told(f"{family:7s} {count:8d} targets", total, f"{total.rms:.2f} of the best", took)
-        for kind in VOLUMES:
-            begin = time.process_time()
-            total = Scores.of([volume_of(family, kind, seed) for seed in range(seeds)])
-            took = (time.process_time() - begin) / seeds
-            told(f"{family:7s} {kind:>16s}", total, f"{1e3 * total.rms:.2f} um", took)
+        for mixture in mixtures or volumetric.MIXTURES:
+            pairs = []
+            took = 0.0
+            for seed in range(seeds):
+                pairs.append(volume_of(family, mixture, seed))
+            total, best = (Scores.of([pair[k] for pair in pairs]) for k in range(2))
+            words = (
+                f"{1e3 * total.rms:.2f} um, {total.rms / best.rms:.2f} of the best, which covers "
+                f"{100 * best.coverage:.1f} % by {best.mean / best.rms:.2f}"
+            )
+            told(f"{family:7s} {mixture:>16s}", total, words, took)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 20, sys.argv[2:] or list(families.FAMILIES))
+    words = sys.argv[2:]
+    chosen = [word for word in words if word in volumetric.MIXTURES]
+    main(
+        int(sys.argv[1]) if len(sys.argv) > 1 else 20,
+        [word for word in words if word not in chosen] or list(families.FAMILIES), chosen,
+    )  # fmt: skip

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
-from cases.calibration import FRESH, cloud, measurements_of, rays, two_pods
+from cases import volumetric
+from cases.best_linear import Best
+from cases.calibration import FRESH, measurements_of
 from judge import families, simulated
 
 from olp.calibration.estimator.adjustment import fit
@@ -72,16 +74,15 @@ def best_of(family: str, name: str, count: int) -> float:
     return float(np.sqrt(np.mean(sigma**2)))
 
 
-def volume_of(family: str, kind: str, seed: int) -> Scores:
-    """A machine measured by points, stations or pods, judged at poses."""
+def volume_of(family: str, mixture: str, seed: int, *, against_best: bool = True) -> tuple[Scores, Scores]:
+    """A machine measured by a mixture (`volumetric.MIXTURES`), judged at poses. Errors and stated sigma in mm
+    are of the fit, then of the best linear estimator from the same readings (`against_best`)."""
     machine = families.machine(seed, family)
-    taken = {
-        "points": lambda: (cloud(machine, seed, 120, 5.0),),
-        "stations": lambda: rays(machine, seed, 6, 150),
-        "pods": lambda: (two_pods(machine, seed, 250),),
-    }[kind]()
-    fitted = fit(dataclasses.replace(measurements_of(()), observations=taken), machine.chain)
+    datum = (0.0, 0.0, 0.0)
+    fitted = fit(volumetric.readings(machine, mixture, seed), machine.chain, datum_mm=datum)
     rng = np.random.default_rng(seed)
     position, tool = rng.uniform(*machine.box.T, (POSITIONS * 3, 3)), np.array(FRESH[1])
-    off = fitted.error(position, tool) - machine.error(position, tool)
-    return Scores(off.ravel(), fitted.sigma(position, tool).ravel())
+    true = machine.error(position, tool)
+    own = fitted.error(position, tool), fitted.sigma(position, tool)
+    best = Best(fitted, family).at(position, tool) if against_best else own
+    return Scores((own[0] - true).ravel(), own[1].ravel()), Scores((best[0] - true).ravel(), best[1].ravel())

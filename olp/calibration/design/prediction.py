@@ -65,7 +65,7 @@ def predict(planned: Planned, chain: str, box_mm: Array, tools: Sequence[Vector]
     """The prediction for a box (3, 2) and tool vectors."""
     taken = planned.measurements
     parameters = _parameters(taken, chain, box_mm)
-    prior = Prior(parameters, {}, artefacts_of(taken, parameters), dict(TYPICAL))
+    prior = Prior(parameters, {}, artefacts_of(taken, parameters), TYPICAL)
     theta = np.zeros(parameters.size)
     normal = Normal.of(parameters.size)
     for state in planned.states:

@@ -12,13 +12,14 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from olp.calibration.estimator.basis import Wave
-from olp.calibration.estimator.beside import block_of
+from olp.calibration.estimator.beside import block_of, shares_of
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.model import MOST, Model, artefacts_of
 from olp.calibration.estimator.normal import Block, Normal, Solved, solve
 from olp.calibration.estimator.parameters import Parameters
-from olp.calibration.estimator.prior import Class, Prior
-from olp.calibration.observations.base import Noise, Outlier, Result, State
+from olp.calibration.estimator.prior import Prior
+from olp.calibration.estimator.unread import Unread
+from olp.calibration.observations.base import Noise, Outlier, Result, ScatteredState, State
 from olp.calibration.observations.lines import Line
 from olp.calibration.observations.measurements import Measurements
 from olp.core.machine import Vector
@@ -30,10 +31,16 @@ from olp.core.values import dataclass
 POINT_CELLS = 16
 #: A fit is bad where chi-square is more than so many standard deviations above its expectation.
 MISFIT = 5.0
-#: More cells are kept where they lower reduced chi-square to less than this share.
-BETTER = 0.8
+#: Still finer cells are tried where the last ones raised the log evidence by so much.
+WORTH = 30.0
+#: So many readings are needed for each unknown of present cells before finer ones are tried.
+READINGS = 1.25
+#: Finer cells are tried where present ones hide a variance so many times that of the noise of readings.
+HIDES = 1.0
 #: The adjustment is repeated at most so often, after cyclic terms or points were left out.
 PASSES = 8
+#: Curves without lines are learnt in so many passes at most.
+LEARNING = 2
 #: A cyclic term below so many standard deviations is noise.
 CYCLIC_SIGNIFICANT = 4.0
 
@@ -56,8 +63,24 @@ class _Settled:
     blocks: Sequence[Block]
     outliers: Sequence[Outlier]
     prior: Prior
+    unread: Unread
     normal: Normal
     solved: Solved
+
+    @property
+    def coarse(self) -> bool:
+        """Whether cells hide so much that readings of some instrument are worse for it than by their noise,
+        and there are more readings than finer cells would have unknowns."""
+        p, theta = self.prior.parameters, self.solved.theta
+        if self.normal.count < READINGS * p.size:
+            return False
+        for state in self.states:
+            if isinstance(state, ScatteredState):
+                block, shares = shares_of(state, theta, p, self.prior.hidden)
+                noise = np.concatenate([chunk.sigma for chunk in block.chunks()])
+                if np.median(shares.sum(axis=1) / noise**2) > HIDES:
+                    return True
+        return False
 
 
 def fit(
@@ -76,19 +99,22 @@ def fit(
     """
     tell = progress or silent
 
-    def attempt(cells: int) -> Fit:
+    def attempt(cells: int, known: Unread | None = None) -> tuple[Fit, _Settled]:
         start = _start(measurements, chain, travel_mm, datum_mm, tell, cells)
-        return _finish(start, _iterate(start, tell))
+        end = _iterate(start, known or Unread(start.model.others), tell)
+        return _finish(start, end), end
 
     cells = POINT_CELLS
-    best = attempt(cells)
+    best, end = attempt(cells)
     alone = {line.component[2] for line in measurements.lines} != set(AXES)
-    while alone and best.misfit > MISFIT and cells < MOST:
+    while alone and cells < MOST and (best.misfit > MISFIT or end.coarse):
         cells *= 2
-        finer = attempt(cells)
-        if finer.chi_square / finer.freedom > BETTER * best.chi_square / best.freedom:
+        finer, other = attempt(cells, end.unread)
+        gain = other.solved.evidence - end.solved.evidence
+        if gain > 0.0:
+            best, end = finer, other
+        if gain < WORTH:
             break
-        best = finer
     return best
 
 
@@ -114,31 +140,32 @@ def _start(
     return _Start(measurements, model, states, [slip for one in screened for slip in one.outliers])
 
 
-def _iterate(start: _Start, tell: Progress) -> _Settled:
+def _iterate(start: _Start, unread: Unread, tell: Progress) -> _Settled:
     """Solves, updates what is not linear, and leaves out noise terms and outliers, until nothing changes."""
     states, outliers, waves = start.states, [*start.outliers], start.model.waves
     theta = np.zeros(0)
-    learnt: dict[str, Class] | None = None
-    for _ in range(PASSES):
+    for turn in range(PASSES):
         parameters = start.model.parameters(waves)
-        prior = Prior(parameters, start.model.shapes, artefacts_of(start.measurements, parameters))
-        if learnt is not None:
-            prior.classes = learnt
+        squares = artefacts_of(start.measurements, parameters)
+        prior = Prior(parameters, start.model.shapes, squares, unread.classes)
         theta = theta if len(theta) == parameters.size else np.zeros(parameters.size)
-        blocks = [block_of(state, theta, parameters, start.model.shapes) for state in states]
+        # before the first pass the places of instruments are only near
+        learnt = turn < LEARNING and unread.learn(prior, states, theta)
+        prior.classes = unread.classes
+        blocks = [block_of(state, theta, parameters, prior.hidden) for state in states]
         tell("adjustment", 0.5)
-        normal, solved = _adjusted(blocks, prior, learnt is None)
-        learnt, theta = prior.classes, solved.theta
+        normal, solved = _adjusted(blocks, prior)
+        theta = solved.theta
         seen = _waves_seen(parameters, solved)
         steps = [state.step(block, theta) for state, block in zip(states, blocks, strict=True)]
         settled = all(step.small for step in steps)
         slips = [state.slips(block, theta, settled) for state, block in zip(states, blocks, strict=True)]
-        if seen == waves and settled and not any(slips):
+        if seen == waves and settled and not any(slips) and not (learnt and turn + 1 < LEARNING):
             break
         waves = seen
         outliers += [slip for some in slips for slip in some]
         states = [state.moved(step, some) for state, step, some in zip(states, steps, slips, strict=True)]
-    return _Settled(states, blocks, outliers, prior, normal, solved)
+    return _Settled(states, blocks, outliers, prior, unread, normal, solved)
 
 
 def _finish(start: _Start, end: _Settled) -> Fit:
@@ -161,18 +188,13 @@ def _finish(start: _Start, end: _Settled) -> Fit:
     )  # fmt: skip
 
 
-def _adjusted(blocks: Iterable[Block], prior: Prior, learn: bool) -> tuple[Normal, Solved]:
-    """The readings' normal equations and their solution, with what the prior is to learn from them."""
+def _adjusted(blocks: Iterable[Block], prior: Prior) -> tuple[Normal, Solved]:
+    """The readings' normal equations and their solution."""
     normal = Normal.of(prior.parameters.size)
     for block in blocks:
         normal.add(block)
     prior.push(normal)
-    if learn:
-        prior.learn(normal)
-    solved = solve(normal, *prior.precision())
-    if learn and prior.size_from(solved.theta):
-        solved = solve(normal, *prior.precision())
-    return normal, solved
+    return normal, solve(normal, *prior.precision())
 
 
 def _waves_seen(parameters: Parameters, solved: Solved) -> dict[str, tuple[Wave, ...]]:

@@ -1,7 +1,8 @@
 """Readings beside the targets of lines: they also see what the cells of a curve hide there.
 
 A tip at a position that no line read has an error that the unknowns do not hold: a wave of a screw, a dent.
-Its variance is known (`between.Hidden`). It is no mistake of the reading, so it counts as its noise.
+Its variance is known (`between.Hidden`). It is no mistake of the reading, so it counts as its noise. Readings
+at one position see the same of it: repeating them does not average it.
 """
 
 from __future__ import annotations
@@ -10,56 +11,64 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from olp.calibration.estimator.between import Hidden
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import CROSS, Parameters, Unknowns
-from olp.calibration.estimator.smoothing import Shape
 from olp.calibration.observations.base import ScatteredState, State
 from olp.calibration.observations.radial import AlongState
 from olp.core.arrays import Array
 from olp.core.units import AXES
 from olp.core.values import dataclass
 
+#: Readings at positions nearer than this are at one position, mm.
+_SAME_MM = 1e-3
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Beside:
-    """Unknowns, and beside them one for each curve with lines: what its cells hide at the position, in
-    standard deviations."""
+    """Unknowns, and beside them one for each curve: what its cells hide at the position, in standard
+    deviations."""
 
     unknowns: Unknowns
     parameters: Parameters
-    shapes: Mapping[str, Shape]
+    hidden: Mapping[str, Hidden]
 
     @property
     def size(self) -> int:
-        return self.unknowns.size + len(self.shapes)
+        return self.unknowns.size + len(self.hidden)
 
     def design(self, position: Array, tool: Array, /) -> Array:
-        table = np.zeros((len(position), 3, len(self.shapes)))
-        for column, (name, shape) in enumerate(self.shapes.items()):
+        table = np.zeros((len(position), 3, len(self.hidden)))
+        for column, (name, hidden) in enumerate(self.hidden.items()):
             axis = AXES.index(name[2])
-            sigma = np.sqrt(shape.hidden.at(position[:, axis]))
+            sigma = np.sqrt(hidden.at(position[:, axis]))
             if name[1] in AXES:
                 table[:, AXES.index(name[1]), column] = sigma
             for row, angle, lever, sign in CROSS:
                 if "ABC"[angle] == name[1]:
                     arm = self.parameters.lever_arm(row, axis, lever, position, tool)
                     table[:, row, column] = sign * sigma * arm
+        table *= np.sqrt(_repeated(position))[:, None, None]
         return np.concatenate([self.unknowns.design(position, tool), table], axis=2)
 
 
+def _repeated(position: Array) -> Array:
+    """(n,) how many positions are at the same place as each of positions (n, 3)."""
+    rounded = np.round(position / _SAME_MM).astype(np.int64)
+    _, inverse, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
+    return np.asarray(counts[inverse.reshape(-1)])
+
+
 def block_of(
-    state: State, theta: Array, parameters: Parameters, shapes: Mapping[str, Shape],
+    state: State, theta: Array, parameters: Parameters, hidden: Mapping[str, Hidden],
     unknowns: Unknowns | None = None,
 ) -> Block:  # fmt: skip
     """The readings of a state as functionals of `unknowns` (the parameters, if left out) at theta, with the
-    noise of what curves with lines hide at their positions. Raises ConfigError or CannotCompute where they
-    cannot be used."""
+    noise of what curves hide at their positions. Raises ConfigError or CannotCompute where they cannot be
+    used."""
     if not isinstance(state, ScatteredState | AlongState):
         return state.block(parameters, theta)
-    unknowns = unknowns or parameters
-    size = unknowns.size
-    theta = np.concatenate([theta, np.zeros(len(shapes))])
-    whole = state.block(_Beside(unknowns, parameters, shapes), theta)
+    whole, size = _whole(state, theta, parameters, hidden, unknowns or parameters)
 
     def chunks() -> Iterator[Chunk]:
         for chunk in whole.chunks():
@@ -67,3 +76,23 @@ def block_of(
             yield Chunk(chunk.rows[:, :size], chunk.y, np.hypot(chunk.sigma, beside), chunk.local)
 
     return Block(np.arange(size), whole.precision, chunks, whole.label)
+
+
+def shares_of(
+    state: ScatteredState | AlongState, theta: Array, parameters: Parameters, hidden: Mapping[str, Hidden]
+) -> tuple[Block, Array]:
+    """The readings of a state without that noise, and (n, curves) the variance that each curve adds."""
+    whole, size = _whole(state, theta, parameters, hidden, parameters)
+    chunks = list(whole.chunks())
+    plain = [Chunk(chunk.rows[:, :size], chunk.y, chunk.sigma, chunk.local) for chunk in chunks]
+    shares = np.concatenate([chunk.rows[:, size:] for chunk in chunks]) ** 2
+    return Block(np.arange(size), whole.precision, lambda: plain, whole.label), shares
+
+
+def _whole(
+    state: ScatteredState | AlongState, theta: Array, parameters: Parameters, hidden: Mapping[str, Hidden],
+    unknowns: Unknowns,
+) -> tuple[Block, int]:  # fmt: skip
+    """The readings with a column for each curve, and how many unknowns are before these."""
+    beside = np.concatenate([theta, np.zeros(len(hidden))])
+    return state.block(_Beside(unknowns, parameters, hidden), beside), unknowns.size

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -26,6 +27,8 @@ _RESOLVED = 6
 _SHORT = 0.75
 #: Cells of the fine spline, at least and at most.
 _FINE = 72, 240
+#: Cells that resolve what is in one cell of a curve without lines.
+_FINER = 8
 #: Positions between two targets where the variance is taken.
 _POSITIONS = 8
 
@@ -58,6 +61,30 @@ def hidden(
     read = _Read(targets, variance, datum_mm, straight)
     left, held = (_left(one, scales, amplitude, q, read, apart=one is fine) for one in (fine, spline))
     return Hidden(q, np.maximum(left - held, 0.0))
+
+
+def beside_cells(spline: Spline, scales: Scales) -> Hidden:
+    """What the cells of `spline` hide of a curve of some scales that no line reads: the same everywhere."""
+    return Hidden(np.array([spline.low_mm]), np.array([_lost(spline.cells) @ scales.values**2]))
+
+
+def in_cells(scales: Scales) -> Scales:
+    """The scales of such a curve less what is shorter than any cell."""
+    return replace(scales, ripple=math.sqrt(1.0 - _SHORT) * scales.ripple)
+
+
+@cache
+def _lost(cells: int) -> Array:
+    """(7,) mean variance over the axis that so many cells do not hold of a process of size 1."""
+    fine = Spline(0.0, 1.0, _FINER * cells)
+    q = np.linspace(0.0, 1.0, 2 * fine.cells + 1)
+    coarse, values = np.linalg.qr(Spline(0.0, 1.0, cells).values(q))[0], fine.values(q)
+    rest = values - coarse @ (coarse.T @ values)
+    lost = np.einsum("ij,kjl,il->k", rest, fine.processes(), rest, optimize=True) / len(q)
+    lost[RIPPLE] = (
+        _SHORT * np.einsum("ij,jl,il->", values, fine.processes()[RIPPLE], values, optimize=True) / len(q)
+    )
+    return np.asarray(lost)
 
 
 def _read(lines: Sequence[tuple[Line, Noise]]) -> tuple[Array, Array]:

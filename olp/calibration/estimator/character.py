@@ -19,6 +19,7 @@ import numpy as np
 from olp.calibration.estimator.basis import Scales, Spline
 from olp.calibration.estimator.normal import Normal
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 
 #: Processes that make the smooth part of a curve, as rows of a spectrum: one of them, and no other.
 SMOOTH = (0, 1, 4, 5, 6)
@@ -57,7 +58,7 @@ def class_of(name: str) -> str:
 
 
 @cache
-def _rms() -> Array:
+def rms_of_processes() -> Array:
     """(7,) root mean square over the axis of each process of size 1."""
     spline = Spline(0.0, 1.0, 120)
     values = spline.values(np.linspace(0.0, 1.0, 721))
@@ -72,7 +73,7 @@ def _table(every: int) -> Array:
     table = np.zeros((math.prod(len(grid[::every]) for grid in (SMOOTH, SIZES, STEPS, RIPPLE)), 7))
     for row, (process, size, steps, ripple) in zip(table, combined, strict=True):
         row[[process, 2, 3]] = size, steps, ripple
-    return table / _rms()
+    return table / rms_of_processes()
 
 
 def candidates(kind: str) -> Array:
@@ -146,22 +147,46 @@ def _integrated(values: Array) -> Array:
 def characters(values: Mapping[str, Array]) -> dict[str, Scales]:
     """The scales of each component, from the log evidence (n,) of all candidates for each. Those of one class
     differ little, those of others more."""
-    kinds = {name: class_of(name) for name in values}
-    chances = {name: _normal(own) for name, own in values.items()}
-    heard = {name: _logarithm(_blurred(own, ALIKE)) for name, own in chances.items()}
-    zero = np.zeros(_SHAPE)
-    classes = {
-        kind: sum((heard[name] for name in heard if kinds[name] == kind), zero)
-        for kind in sorted(set(kinds.values()))
+    shared = _Shared.of(values)
+    return {
+        name: _expected(_normal(own) * shared.prior(class_of(name), name), class_of(name))
+        for name, own in values.items()
     }
-    spread = {kind: _logarithm(_blurred(_normal(own), RELATED)) for kind, own in classes.items()}
-    found, before = {}, _before()
-    for name, own in chances.items():
-        kind = kinds[name]
-        others = sum((table for other, table in spread.items() if other != kind), zero)
-        prior = _blurred(_normal(classes[kind] - heard[name] + others + before), ALIKE)
-        found[name] = _expected(own * prior, kind)
-    return found
+
+
+def of_others(values: Mapping[str, Array]) -> dict[str, Array]:
+    """Probabilities of kinds, sizes, steps and ripple of a curve without lines, by class: what the curves
+    with lines say by their log evidence (n,), and what is likely before any reading."""
+    shared = _Shared.of(values)
+    return {kind: shared.prior(kind) for kind in USUAL}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shared:
+    """Log probabilities of candidates by component and, from all its components, by class."""
+
+    heard: Mapping[str, Array]
+    classes: Mapping[str, Array]
+
+    @classmethod
+    def of(cls, values: Mapping[str, Array]) -> _Shared:
+        heard = {name: _logarithm(_blurred(_normal(own), ALIKE)) for name, own in values.items()}
+        classes = {
+            kind: sum((heard[name] for name in heard if class_of(name) == kind), np.zeros(_SHAPE))
+            for kind in sorted({class_of(name) for name in heard})
+        }
+        return cls(heard, classes)
+
+    def prior(self, kind: str, name: str = "") -> Array:
+        """Probabilities for a component of a class, by all components but itself."""
+        zero = np.zeros(_SHAPE)
+        own = self.classes.get(kind, zero) - self.heard.get(name, zero)
+        others = [
+            _logarithm(_blurred(_normal(table), RELATED))
+            for one, table in self.classes.items()
+            if one != kind
+        ]
+        return _blurred(_normal(own + sum(others, zero) + _before()), ALIKE)
 
 
 #: Kinds of smooth parts, sizes of them, steps, ripple.

@@ -72,7 +72,7 @@ class Fit:
 
     def block(self, state: State) -> Block:
         """The readings of a state at the solution. Raises ConfigError or CannotCompute."""
-        return block_of(state, self.theta, self.parameters, self.prior.shapes)
+        return block_of(state, self.theta, self.parameters, self.prior.hidden)
 
     def design(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
         """(n, 3, size) dependence of the error on theta. It is in the frame of the machine where some points
@@ -113,8 +113,7 @@ class Fit:
         probability u, so it is J^2 u (1 - u)."""
         space = self.parameters.spaces[name]
         raw = space.gauge @ self.theta[self.parameters.slices[name]]
-        shape = self.prior.shapes.get(name)
-        total = np.zeros(len(q)) if shape is None else shape.hidden.at(q)
+        total = self.prior.hidden[name].at(q)
         for feature, jump in zip(space.features, raw[space.spline.count :], strict=True):
             if isinstance(feature, Step):
                 u = feature.values(q)

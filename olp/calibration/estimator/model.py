@@ -10,6 +10,7 @@ import numpy as np
 
 from olp.calibration.estimator.basis import CurveSpace, Scales, Spline, Step, Wave
 from olp.calibration.estimator.between import Hidden, hidden
+from olp.calibration.estimator.character import of_others
 from olp.calibration.estimator.parameters import MeasuringLine, Parameters
 from olp.calibration.estimator.smoothing import AMPLITUDE, Features, Shape, features_of, shapes_of
 from olp.calibration.iso230.separation import aliased
@@ -42,7 +43,8 @@ SWEEP = 0.3
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
     """What holds throughout an adjustment. `lines` each with its noise, `box_mm` (3, 2) what the readings
-    cover, `waves` the cyclic terms to begin with, `unobservable` why others are not observable."""
+    cover, `others` the character of curves without lines (`character.of_others`). `waves` are the cyclic
+    terms to begin with, `unobservable` says why others are not observable."""
 
     chain: str
     datum_mm: Vector
@@ -50,6 +52,7 @@ class Model:
     lines: Sequence[tuple[Line, Noise]]
     splines: Sequence[Spline]
     shapes: Mapping[str, Shape]
+    others: Mapping[str, Array]
     waves: Mapping[str, tuple[Wave, ...]]
     unobservable: Mapping[tuple[str, float], str]
     framed: bool
@@ -68,9 +71,9 @@ class Model:
         x, y, z = datum_mm or (float(np.clip(0.0, *side)) for side in box)
         splines = [_spline(own, axis, ranges[axis], cells) for axis in range(3)]
         waves, unobservable = _waves(measurements, own, observations)
-        shapes = _shapes(_without_form(lines), splines, waves, (x, y, z), tell)
+        shapes, others = _shapes(_without_form(lines), splines, waves, (x, y, z), tell)
         framed = any(taken.framed for taken in observations)
-        return cls(chain, (x, y, z), box, lines, splines, shapes, waves, unobservable, framed)
+        return cls(chain, (x, y, z), box, lines, splines, shapes, others, waves, unobservable, framed)
 
     def parameters(self, waves: Mapping[str, tuple[Wave, ...]]) -> Parameters:
         """The layout of theta with some cyclic terms."""
@@ -189,9 +192,10 @@ def _shapes(
     waves: Mapping[str, tuple[Wave, ...]],
     datum_mm: Vector,
     tell: Progress,
-) -> dict[str, Shape]:
+) -> tuple[dict[str, Shape], dict[str, Array]]:
     """The shape of every component with lines: the features of each by itself, then again where others have
-    their steps; then the scales of all curves of a class."""
+    their steps; then the scales of all curves of a class. Also what curves without lines are like,
+    by class."""
     found: dict[str, Features] = {}
     # angles first: a reflector on the table reads their steps, too
     order = sorted(COMPONENTS, key=lambda name: name[1] in AXES)
@@ -218,7 +222,7 @@ def _shapes(
         amplitude = AMPLITUDE[name[1] in "ABC"]
         return hidden(_own_lines(name, lines), splines[axis], scales, amplitude, datum_mm[axis])
 
-    return shapes_of(found, hides)
+    return shapes_of(found, hides), of_others({name: own.values for name, own in found.items()})
 
 
 def _on_table(lines: Sequence[tuple[Line, Noise]]) -> bool:

@@ -50,13 +50,15 @@ class Block:
 @dataclass(slots=True, eq=False)
 class Normal:
     """H theta = g over n parameters; `square` is the weighted sum of y^2 that locals do not explain, `count`
-    the readings, and `free` the local unknowns without a prior."""
+    the readings, and `free` the local unknowns without a prior. `log_noise` is what the size of the noise
+    takes off the log evidence: the logarithms of standard deviations, and of what locals leave open."""
 
     H: Array
     g: Array
     square: float = 0.0
     count: int = 0
     free: int = 0
+    log_noise: float = 0.0
 
     @classmethod
     def of(cls, n: int) -> Normal:
@@ -71,6 +73,7 @@ class Normal:
             table /= chunk.sigma[:, None]
             gram += table.T @ table
             self.count += len(chunk.y)
+            self.log_noise += float(np.log(chunk.sigma).sum())
         kept = [*range(k), k + m]
         inner = gram[k : k + m, k : k + m] + np.diag(block.precision)
         outer = gram[np.ix_(kept, range(k, k + m))]
@@ -79,6 +82,7 @@ class Normal:
         self.g[block.columns] += reduced[:k, k]
         self.square += float(reduced[k, k])
         self.free += int(np.sum(block.precision == 0.0))
+        self.log_noise += 0.5 * float(np.linalg.slogdet(inner)[1])
 
 
 def residuals_of(block: Block, theta: Array) -> tuple[Array, Array, Array]:
@@ -108,7 +112,8 @@ def evidence(normal: Normal, prior: Array, prior_logdet: float) -> float:
     factor, scale = _factor(normal.H + prior)
     explained = _forward(factor, normal.g / scale)
     logdet = 2.0 * float(np.log(np.diag(factor)).sum() + np.log(scale).sum())
-    return -0.5 * (normal.square - float(explained @ explained)) - 0.5 * logdet + 0.5 * prior_logdet
+    square = normal.square - float(explained @ explained)
+    return -0.5 * (square + logdet - prior_logdet) - normal.log_noise
 
 
 def solve(normal: Normal, prior: Array, prior_logdet: float = 0.0) -> Solved:
@@ -120,7 +125,8 @@ def solve(normal: Normal, prior: Array, prior_logdet: float = 0.0) -> Solved:
     covariance = cho_solve((factor, True), np.eye(len(scale))) / np.outer(scale, scale)
     explained = _forward(factor, normal.g / scale)
     logdet = 2.0 * float(np.log(np.diag(factor)).sum() + np.log(scale).sum())
-    log_evidence = -0.5 * (normal.square - float(explained @ explained)) - 0.5 * logdet + 0.5 * prior_logdet
+    square = normal.square - float(explained @ explained)
+    log_evidence = -0.5 * (square + logdet - prior_logdet) - normal.log_noise
     return Solved(theta, 0.5 * (covariance + covariance.T), log_evidence)
 
 

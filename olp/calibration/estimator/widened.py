@@ -89,7 +89,7 @@ class Adjustment:
         both = Both(fit.parameters, modes)
         theta = np.concatenate([fit.theta, np.zeros(self.own)])
         sets = [
-            (r.state, block_of(r.state, theta, fit.parameters, fit.prior.shapes, both)) for r in fit.scattered
+            (r.state, block_of(r.state, theta, fit.parameters, fit.prior.hidden, both)) for r in fit.scattered
         ]
         self.blocks = [block for _, block in sets]
         local = [len(block.precision) for block in self.blocks]

@@ -25,11 +25,11 @@ def test_what_curves_hide_is_noise_of_points_with_their_lever_arms() -> None:
     expected = np.full((6, 3), 1e-6)
     for axis, letter in enumerate("XYZ"):
         arm = tool + position * (np.arange(3) > axis)
-        for name, shape in fitted.prior.shapes.items():
+        for name, hidden in fitted.prior.hidden.items():
             if name[2] == letter:
                 turned = np.eye(3)["XYZABC".index(name[1]) % 3]
                 moved = turned + 0.0 * arm if name[1] in "XYZ" else np.cross(turned, arm)
-                expected += shape.hidden.at(position[:, axis])[:, None] * moved**2
+                expected += hidden.at(position[:, axis])[:, None] * moved**2
     assert chunk.sigma.reshape(6, 3) == pytest.approx(np.sqrt(expected), rel=1e-9)
     assert chunk.sigma.min() > 1.5e-3
     assert chunk.rows.shape == (18, fitted.parameters.size)

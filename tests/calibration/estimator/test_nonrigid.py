@@ -99,11 +99,12 @@ def test_nothing_is_invented_on_rigid_machines(family: str, seed: int) -> None:
 
 @pytest.mark.slow
 def test_noise_that_was_stated_too_small_is_no_field() -> None:
-    points = cloud(simulated.machine(203, "smooth"), 203, 120, 5.0)
+    """It is more than what curves hide between positions."""
+    points = cloud(simulated.machine(203, "smooth"), 203, 120, 20.0)
     lying = dataclasses.replace(points, sigma=0.5 * points.sigma)
     result = nonrigid(fit(Measurements("simulated", (lying,)), "FXYZ"))
     assert not result.processes
-    assert result.noise > 1.2
+    assert result.noise > 1.1
 
 
 @pytest.mark.slow
@@ -168,7 +169,7 @@ def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
         curves = np.linalg.inv(before.prior.precision()[0])
         rigid = chunk.rows[:, :size] @ curves @ chunk.rows[:, :size].T + nominal
         field = (chunk.rows[:, size:] * variance) @ chunk.rows[:, size:].T
-        noise = np.eye(len(chunk.y)) * points.sigma**2
+        noise = np.diag(chunk.sigma**2)
         cov = 1.69 * (rigid + noise) + field
         return float(-0.5 * np.linalg.slogdet(cov)[1] - 0.5 * chunk.y @ np.linalg.solve(cov, chunk.y))
 
