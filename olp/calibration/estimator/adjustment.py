@@ -8,6 +8,7 @@ covariance of all of it, so that it also shows what is not observable from these
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,9 +33,9 @@ POINT_CELLS = 16
 #: A fit is bad where chi-square is more than so many standard deviations above its expectation.
 MISFIT = 5.0
 #: Still finer cells are tried where the last ones raised the log evidence by so much.
-WORTH = 30.0
+WORTH = 60.0
 #: So many readings are needed for each unknown of present cells before finer ones are tried.
-READINGS = 1.25
+READINGS = 2.0
 #: Finer cells are tried where present ones hide a variance so many times that of the noise of readings.
 HIDES = 1.0
 #: The adjustment is repeated at most so often, after cyclic terms or points were left out.
@@ -99,9 +100,13 @@ def fit(
     """
     tell = progress or silent
 
-    def attempt(cells: int, known: Unread | None = None) -> tuple[Fit, _Settled]:
+    def attempt(cells: int, before: _Settled | None = None) -> tuple[Fit, _Settled]:
         start = _start(measurements, chain, travel_mm, datum_mm, tell, cells)
-        end = _iterate(start, known or Unread(start.model.others), tell)
+        unread, learning = Unread(start.model.others), LEARNING
+        if before is not None:
+            start = replace(start, states=before.states, outliers=before.outliers)
+            unread, learning = before.unread, 1
+        end = _iterate(start, unread, learning, tell)
         return _finish(start, end), end
 
     cells = POINT_CELLS
@@ -109,7 +114,7 @@ def fit(
     alone = {line.component[2] for line in measurements.lines} != set(AXES)
     while alone and cells < MOST and (best.misfit > MISFIT or end.coarse):
         cells *= 2
-        finer, other = attempt(cells, end.unread)
+        finer, other = attempt(cells, end)
         gain = other.solved.evidence - end.solved.evidence
         if gain > 0.0:
             best, end = finer, other
@@ -140,18 +145,19 @@ def _start(
     return _Start(measurements, model, states, [slip for one in screened for slip in one.outliers])
 
 
-def _iterate(start: _Start, unread: Unread, tell: Progress) -> _Settled:
+def _iterate(start: _Start, unread: Unread, learning: int, tell: Progress) -> _Settled:
     """Solves, updates what is not linear, and leaves out noise terms and outliers, until nothing changes."""
     states, outliers, waves = start.states, [*start.outliers], start.model.waves
     theta = np.zeros(0)
     for turn in range(PASSES):
         parameters = start.model.parameters(waves)
         squares = artefacts_of(start.measurements, parameters)
-        prior = Prior(parameters, start.model.shapes, squares, unread.classes)
+        shapes = start.model.shapes
+        prior = Prior(parameters, unread.shapes(shapes), squares, unread.classes)
         theta = theta if len(theta) == parameters.size else np.zeros(parameters.size)
         # before the first pass the places of instruments are only near
-        learnt = turn < LEARNING and unread.learn(prior, states, theta)
-        prior.classes = unread.classes
+        if turn < learning and unread.learn(prior, states, theta):
+            prior = Prior(parameters, unread.shapes(shapes), squares, unread.classes)
         blocks = [block_of(state, theta, parameters, prior.hidden) for state in states]
         tell("adjustment", 0.5)
         normal, solved = _adjusted(blocks, prior)
@@ -160,7 +166,7 @@ def _iterate(start: _Start, unread: Unread, tell: Progress) -> _Settled:
         steps = [state.step(block, theta) for state, block in zip(states, blocks, strict=True)]
         settled = all(step.small for step in steps)
         slips = [state.slips(block, theta, settled) for state, block in zip(states, blocks, strict=True)]
-        if seen == waves and settled and not any(slips) and not (learnt and turn + 1 < LEARNING):
+        if seen == waves and settled and not any(slips):
             break
         waves = seen
         outliers += [slip for some in slips for slip in some]

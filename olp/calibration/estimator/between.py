@@ -24,7 +24,7 @@ from olp.core.values import dataclass
 #: Cells between two targets that resolve what happens there.
 _RESOLVED = 6
 #: Share of the variance of ripple that waves shorter than cells have.
-_SHORT = 0.75
+SHORT = 0.75
 #: Cells of the fine spline, at least and at most.
 _FINE = 72, 240
 #: Cells that resolve what is in one cell of a curve without lines.
@@ -57,7 +57,7 @@ def hidden(
     ends = np.array([spline.low_mm, spline.high_mm])
     q = np.union1d((targets[:-1, None] + inside).ravel(), np.append(targets[-1:], ends))
     straight = lines[0][0].quantity == "straightness"
-    scales = replace(scales, ripple=math.sqrt(_SHORT) * scales.ripple)
+    scales = replace(scales, ripple=math.sqrt(SHORT) * scales.ripple)
     read = _Read(targets, variance, datum_mm, straight)
     left, held = (_left(one, scales, amplitude, q, read, apart=one is fine) for one in (fine, spline))
     return Hidden(q, np.maximum(left - held, 0.0))
@@ -70,7 +70,15 @@ def beside_cells(spline: Spline, scales: Scales) -> Hidden:
 
 def in_cells(scales: Scales) -> Scales:
     """The scales of such a curve less what is shorter than any cell."""
-    return replace(scales, ripple=math.sqrt(1.0 - _SHORT) * scales.ripple)
+    return replace(scales, ripple=math.sqrt(1.0 - SHORT) * scales.ripple)
+
+
+def with_more(one: Hidden, more: float) -> Hidden:
+    """The same with more or less variance beside targets."""
+    if more > 0.0:
+        # at the datum nothing is hidden, whatever the ripple
+        return replace(one, variance=one.variance * (1.0 + more / max(float(one.variance.mean()), 1e-300)))
+    return replace(one, variance=np.maximum(one.variance + more, 0.0))
 
 
 @cache
@@ -82,7 +90,7 @@ def _lost(cells: int) -> Array:
     rest = values - coarse @ (coarse.T @ values)
     lost = np.einsum("ij,kjl,il->k", rest, fine.processes(), rest, optimize=True) / len(q)
     lost[RIPPLE] = (
-        _SHORT * np.einsum("ij,jl,il->", values, fine.processes()[RIPPLE], values, optimize=True) / len(q)
+        SHORT * np.einsum("ij,jl,il->", values, fine.processes()[RIPPLE], values, optimize=True) / len(q)
     )
     return np.asarray(lost)
 

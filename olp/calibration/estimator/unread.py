@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field, fields, replace
 
 import numpy as np
 
 from olp.calibration.estimator.basis import Scales
 from olp.calibration.estimator.beside import block_of, shares_of
-from olp.calibration.estimator.between import Hidden
+from olp.calibration.estimator.between import SHORT, Hidden, with_more
 from olp.calibration.estimator.character import (
     RIPPLE,
     SIZES,
@@ -27,20 +27,23 @@ from olp.calibration.estimator.character import (
 )
 from olp.calibration.estimator.normal import Block, Chunk, Normal, evidence
 from olp.calibration.estimator.prior import Class, Prior
+from olp.calibration.estimator.smoothing import Shape
 from olp.calibration.observations.base import ScatteredState, State
 from olp.calibration.observations.radial import AlongState
 from olp.core.arrays import Array
 from olp.core.values import dataclass
 
-#: The straight part of a curve against the smooth rest, root mean squares. Positioning has a scale of its own,
-#: of screws, racks and temperature.
+#: The straight part of a curve against the smooth rest, root mean squares. Positioning has a scale of its
+#: own, of screws, racks and temperature.
 STRAIGHT = {"positioning": 3.0, "straightness": 1.5, "angle": 1.5}
 #: Smooth part of positioning before any reading, mm, and the standard deviation of its logarithm.
 SIZE_BEFORE = 0.03, 0.8
 #: How far classes differ from what they usually are to each other, as a standard deviation of a logarithm.
 RELATED = 0.8
 #: Readings from which all this is learnt, at most: more say the same.
-ENOUGH = 3000
+ENOUGH = 1000
+#: Logarithm of how much less probable candidates are, before readings beside lines, that are not tried.
+IMPROBABLE = 9.0
 #: Sizes that are tried on either side of the present one, once it is known.
 _NEAR = 2.0
 
@@ -87,12 +90,14 @@ class Unread:
 
     @property
     def classes(self) -> dict[str, Class]:
-        return {kind: one.of(kind) for kind, one in self.own.items()}
+        return _classes(self.own)
 
     def learn(self, prior: Prior, states: Sequence[State], theta: Array) -> bool:
         """Adds what readings beside lines say of the classes; False where there are no such readings."""
         readings = _Readings.of(prior, states, theta)
-        normal = readings.normal(self.classes)
+        if readings is None:
+            return False
+        normal = readings.normal(self.own)
         p = prior.parameters
         kinds = [
             kind for kind in self.own
@@ -101,44 +106,62 @@ class Unread:
                 for name, part in p.slices.items() if name in p.spaces
             )
         ]  # fmt: skip
-        if not kinds or not readings.scattered:
+        if not kinds and not prior.shapes:
             return False
-        self._sweep(readings, kinds)
+        if not self.sized:
+            self._size_all(readings, kinds)
+        self._learn_rough("ripple", RIPPLE, (0, 1, 2), readings, list(self.own))
+        if kinds:
+            self._sweep(readings, kinds)
+            self._learn_rough("steps", STEPS, (0, 1, 3), readings, kinds)
         self.sized = self.heard = True
         return True
 
+    def shapes(self, shapes: Mapping[str, Shape]) -> Mapping[str, Shape]:
+        """Those of curves with lines, with the ripple that readings beside these lines show."""
+        if not self.heard:
+            return shapes
+        changed = {}
+        for name, shape in shapes.items():
+            ripple = self.own[class_of(name)].ripple
+            more = change_of_ripple(shape.scales, ripple, name)
+            scales = replace(shape.scales, ripple=ripple * USUAL[class_of(name)] / rms_of_processes()[3])
+            changed[name] = replace(shape, scales=scales, hidden=with_more(shape.hidden, more))
+        return changed
+
+    def _score(self, readings: _Readings) -> Callable[[Mapping[str, _Character]], float]:
+        """The log evidence where some classes are changed, with noise as it is now."""
+        normal = readings.normal(self.own)
+        return lambda changed: evidence(normal, *readings.prior.precision(_classes({**self.own, **changed})))
+
+    def _size_all(self, readings: _Readings, kinds: Sequence[str]) -> None:
+        """One size for all classes, to begin with."""
+        score = self._score(readings)
+        tried = [{kind: replace(self.own[kind], size=size) for kind in kinds} for size in SIZES]
+        values = [score(one) + _about(size, *SIZE_BEFORE) for one, size in zip(tried, SIZES, strict=True)]
+        self.own.update(tried[int(np.argmax(values))])
+
     def _sweep(self, readings: _Readings, kinds: Sequence[str]) -> None:
-        normal = readings.normal(self.classes)
-
-        def score(changed: Mapping[str, _Character]) -> float:
-            classes = {kind: one.of(kind) for kind, one in {**self.own, **changed}.items()}
-            return evidence(normal, *readings.prior.precision(classes))
-
-        if not self.sized:
-            tried = [{kind: replace(self.own[kind], size=size) for kind in kinds} for size in SIZES]
-            values = [score(one) + _about(size, *SIZE_BEFORE) for one, size in zip(tried, SIZES, strict=True)]
-            self.own.update(tried[int(np.argmax(values))])
+        score = self._score(readings)
         self._learn_kinds(kinds, score)
         for kind in kinds:
             self._learn_size(kind, score)
-        for part, sizes, axes in (("ripple", RIPPLE, (0, 1, 2)), ("steps", STEPS, (0, 1, 3))):
-            self._learn_rough(part, sizes, axes, readings, kinds)
 
     def _learn_rough(
         self, part: str, sizes: Array, axes: tuple[int, ...], readings: _Readings, kinds: Sequence[str]
     ) -> None:
         """Ripple or steps, of which cells hide some: that is noise of readings."""
-        values = []
+        marginal = _log(np.mean([self.before[kind].sum(axis=axes) for kind in kinds], axis=0))
+        near = marginal > marginal.max() - IMPROBABLE
         if self.heard:
             now = getattr(self.own[kinds[0]], part)
-            near = np.abs(np.arange(len(sizes)) - np.argmin(np.abs(sizes - now))) <= 2
-        else:
-            near = np.ones(len(sizes), bool)
+            near &= np.abs(np.arange(len(sizes)) - np.argmin(np.abs(sizes - now))) <= 2
+        if near.sum() < 2:
+            return
+        values = []
         for size in sizes[near]:
             own = {**self.own, **{kind: replace(self.own[kind], **{part: size}) for kind in kinds}}
-            classes = {kind: one.of(kind) for kind, one in own.items()}
-            values.append(evidence(readings.normal(classes), *readings.prior.precision(classes)))
-        marginal = _log(np.mean([self.before[kind].sum(axis=axes) for kind in kinds], axis=0))
+            values.append(evidence(readings.normal(own), *readings.prior.precision(_classes(own))))
         size = _expected(sizes[near], values + marginal[near])
         self.own.update({kind: replace(self.own[kind], **{part: size}) for kind in kinds})
 
@@ -165,52 +188,94 @@ class Unread:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Readings:
-    """Normal equations of lines, and blocks of other readings with the variance (n, curves) that each curve
-    without lines adds to each of them, per variance that its cells hide."""
+    """Normal equations of lines, and all other readings (n,) with the precision of their own unknowns. `now`
+    (n, curves) is the variance that curves hide at them, `each` the same where all hide a variance of 1."""
 
     prior: Prior
     lines: Normal
-    scattered: Sequence[tuple[Block, Array]]
-    names: Sequence[str]
+    chunk: Chunk
+    precision: Array
+    now: Array
+    each: Array
 
     @classmethod
-    def of(cls, prior: Prior, states: Sequence[State], theta: Array) -> _Readings:
+    def of(cls, prior: Prior, states: Sequence[State], theta: Array) -> _Readings | None:
+        """None where there are only lines."""
         p, hidden = prior.parameters, prior.hidden
-        names = [name for name in hidden if name not in prior.shapes]
-        unit = {**hidden, **dict.fromkeys(names, Hidden(np.zeros(1), np.ones(1)))}
-        columns = [k for k, name in enumerate(unit) if name in names]
-        lines, scattered = Normal.of(p.size), []
+        unit = dict.fromkeys(hidden, Hidden(np.zeros(1), np.ones(1)))
         wide = [state for state in states if isinstance(state, ScatteredState | AlongState)]
+        if not wide:
+            return None
+        lines = Normal.of(p.size)
         for state in states:
-            if state not in wide:
+            if not isinstance(state, ScatteredState | AlongState):
                 lines.add(block_of(state, theta, p, hidden))
-        every = math.ceil(sum(state.count for state in wide) / ENOUGH) or 1
-        for state in wide:
-            block, shares = shares_of(state, theta, p, unit)
-            chunk = _joined(list(block.chunks()), np.delete(shares, columns, axis=1).sum(axis=1), every)
-            scattered.append((Block.of(chunk, block.columns, block.precision), shares[::every, columns]))
         prior.push(lines)
-        return cls(prior, lines, scattered, names)
+        every = math.ceil(sum(_rows(state) for state in wide) / ENOUGH)
+        thin = [_thinned(state, every) for state in wide]
+        blocks, now = zip(*(shares_of(state, theta, p, hidden) for state in thin), strict=True)
+        each = [shares_of(state, theta, p, unit)[1] for state in thin]
+        chunk = _joined([_joined(list(block.chunks())) for block in blocks], apart=True)
+        precision = np.concatenate([block.precision for block in blocks])
+        return cls(prior, lines, chunk, precision, np.concatenate(now), np.concatenate(each))
 
-    def normal(self, classes: Mapping[str, Class]) -> Normal:
-        """All of them, where curves without lines hide what such classes do."""
-        hidden = self.prior.hidden_of(classes)
-        variance = np.array([float(hidden[name].variance[0]) for name in self.names])
+    def normal(self, own: Mapping[str, _Character]) -> Normal:
+        """All of them, with noise as curves of such characters make it."""
+        variance = self.chunk.sigma**2
+        for k, (name, one) in enumerate(self.prior.hidden_of(_classes(own)).items()):
+            shape = self.prior.shapes.get(name)
+            if shape is None:
+                variance = variance + self.each[:, k] * one.variance[0]
+            else:
+                more = change_of_ripple(shape.scales, own[class_of(name)].ripple, name)
+                variance = variance + np.maximum(self.now[:, k] + self.each[:, k] * more, 0.0)
         normal = replace(self.lines, H=self.lines.H.copy(), g=self.lines.g.copy())
-        for block, shares in self.scattered:
-            (chunk,) = block.chunks()
-            sigma = np.sqrt(chunk.sigma**2 + shares @ variance)
-            normal.add(Block.of(replace(chunk, sigma=sigma), block.columns, block.precision))
+        chunk = replace(self.chunk, sigma=np.sqrt(variance))
+        normal.add(Block.of(chunk, np.arange(len(normal.g)), self.precision))
         return normal
 
 
-def _joined(chunks: Sequence[Chunk], more: Array, every: int) -> Chunk:
-    """One chunk with every so many readings, and more (n,) of variance."""
-    rows, y, sigma, local = (
-        np.concatenate([getattr(chunk, name) for chunk in chunks])[::every]
-        for name in ("rows", "y", "sigma", "local")
+def change_of_ripple(scales: Scales, ripple: float, name: str) -> float:
+    """By how much more variance cells hide of a curve of such scales where its ripple is another one, given
+    as root mean square in mm of positioning."""
+    before, after = scales.ripple * rms_of_processes()[3], ripple * USUAL[class_of(name)]
+    return float(SHORT * (after**2 - before**2))
+
+
+def _classes(own: Mapping[str, _Character]) -> dict[str, Class]:
+    return {kind: one.of(kind) for kind, one in own.items()}
+
+
+def _rows(state: ScatteredState | AlongState) -> int:
+    n = state.count
+    return len(state.spread_over_rows(np.ones(n, np.int64))) if isinstance(state, ScatteredState) else n
+
+
+def _thinned(state: ScatteredState | AlongState, every: int) -> ScatteredState | AlongState:
+    """A state with every so many of its readings."""
+    taken, n = state.observation, state.count
+    if every == 1 or not isinstance(state, ScatteredState):
+        return state
+    columns = {one.name: getattr(taken, one.name) for one in fields(taken)}
+    fewer = {name: v[::every] for name, v in columns.items() if isinstance(v, np.ndarray) and len(v) == n}
+    return replace(state, observation=replace(taken, **fewer))
+
+
+def _joined(chunks: Sequence[Chunk], *, apart: bool = False) -> Chunk:
+    """One chunk of all; `apart` where each has unknowns of its own."""
+    rows, y, sigma = (
+        np.concatenate([getattr(chunk, name) for chunk in chunks]) for name in ("rows", "y", "sigma")
     )
-    return Chunk(rows, y, np.sqrt(sigma**2 + more[::every]), local)
+    local = [chunk.local for chunk in chunks]
+    if not apart:
+        return Chunk(rows, y, sigma, np.concatenate(local))
+    whole = np.zeros((len(y), sum(part.shape[1] for part in local)))
+    row = column = 0
+    for part in local:
+        n, m = part.shape
+        whole[row : row + n, column : column + m] = part
+        row, column = row + n, column + m
+    return Chunk(rows, y, sigma, whole)
 
 
 def _expectations(table: Array) -> tuple[tuple[float, ...], float, float, float]:

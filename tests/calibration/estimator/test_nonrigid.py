@@ -159,7 +159,6 @@ def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
             work.reduced(), modes, log + np.array([np.log(size), 0.0, 0.0, 0.0]), np.log(1.3)
         )[0]
 
-    points = before.scattered[0].state.observation
     block, size = work.blocks[0], before.parameters.size
     (chunk,) = block.chunks()
     nominal = chunk.local @ chunk.local.T  # the frame: any
