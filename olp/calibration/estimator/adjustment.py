@@ -37,7 +37,7 @@ WORTH = 60.0
 #: So many readings are needed for each unknown of present cells before finer ones are tried.
 READINGS = 2.0
 #: Finer cells are tried where present ones hide a variance so many times that of the noise of readings.
-HIDES = 1.0
+HIDES = 0.5
 #: The adjustment is repeated at most so often, after cyclic terms or points were left out.
 PASSES = 8
 #: Curves without lines are learnt in so many passes at most.

@@ -40,10 +40,15 @@ STRAIGHT = {"positioning": 3.0, "straightness": 1.5, "angle": 1.5}
 SIZE_BEFORE = 0.03, 0.8
 #: How far classes differ from what they usually are to each other, as a standard deviation of a logarithm.
 RELATED = 0.8
+#: Each is learnt so often the first time, given the others.
+SWEEPS = 2
 #: Readings from which all this is learnt, at most: more say the same.
 ENOUGH = 1000
 #: Logarithm of how much less probable candidates are, before readings beside lines, that are not tried.
 IMPROBABLE = 9.0
+#: Factors of ripple that are tried, and the least ripple that they multiply, mm.
+TIMES = 0.0, 0.125, 0.25, 0.5, 1.0, 2.0
+LEAST_RIPPLE = 2e-4
 #: Sizes that are tried on either side of the present one, once it is known.
 _NEAR = 2.0
 
@@ -73,6 +78,7 @@ class Unread:
     before: Mapping[str, Array]
     own: dict[str, _Character] = field(init=False)
     lined: bool = field(init=False)
+    first: dict[str, _Character] = field(init=False)
     sized: bool = field(init=False)
     heard: bool = field(init=False)
 
@@ -87,6 +93,7 @@ class Unread:
             self.own = {
                 kind: replace(one, size=middle * math.exp(spread**2)) for kind, one in self.own.items()
             }
+        self.first = dict(self.own)
 
     @property
     def classes(self) -> dict[str, Class]:
@@ -94,7 +101,7 @@ class Unread:
 
     def learn(self, prior: Prior, states: Sequence[State], theta: Array) -> bool:
         """Adds what readings beside lines say of the classes; False where there are no such readings."""
-        readings = _Readings.of(prior, states, theta)
+        readings = _Readings.of(prior, self.own, states, theta)
         if readings is None:
             return False
         normal = readings.normal(self.own)
@@ -110,11 +117,12 @@ class Unread:
             return False
         if not self.sized:
             self._size_all(readings, kinds)
-        self._learn_rough("ripple", RIPPLE, (0, 1, 2), readings, list(self.own))
-        if kinds:
-            self._sweep(readings, kinds)
-            self._learn_rough("steps", STEPS, (0, 1, 3), readings, kinds)
-        self.sized = self.heard = True
+        for _ in range(1 if self.heard or not kinds else SWEEPS):
+            self._learn_ripple(readings)
+            if kinds:
+                self._sweep(readings, kinds)
+                self._learn_steps(readings, kinds)
+            self.sized = self.heard = True
         return True
 
     def shapes(self, shapes: Mapping[str, Shape]) -> Mapping[str, Shape]:
@@ -123,10 +131,10 @@ class Unread:
             return shapes
         changed = {}
         for name, shape in shapes.items():
-            ripple = self.own[class_of(name)].ripple
-            more = change_of_ripple(shape.scales, ripple, name)
-            scales = replace(shape.scales, ripple=ripple * USUAL[class_of(name)] / rms_of_processes()[3])
-            changed[name] = replace(shape, scales=scales, hidden=with_more(shape.hidden, more))
+            times = self.own[class_of(name)].ripple / self.first[class_of(name)].ripple
+            hidden = with_more(shape.hidden, _more(shape.scales, times))
+            scales = replace(shape.scales, ripple=times * shape.scales.ripple)
+            changed[name] = replace(shape, scales=scales, hidden=hidden)
         return changed
 
     def _score(self, readings: _Readings) -> Callable[[Mapping[str, _Character]], float]:
@@ -147,23 +155,39 @@ class Unread:
         for kind in kinds:
             self._learn_size(kind, score)
 
-    def _learn_rough(
-        self, part: str, sizes: Array, axes: tuple[int, ...], readings: _Readings, kinds: Sequence[str]
-    ) -> None:
-        """Ripple or steps, of which cells hide some: that is noise of readings."""
-        marginal = _log(np.mean([self.before[kind].sum(axis=axes) for kind in kinds], axis=0))
-        near = marginal > marginal.max() - IMPROBABLE
-        if self.heard:
-            now = getattr(self.own[kinds[0]], part)
-            near &= np.abs(np.arange(len(sizes)) - np.argmin(np.abs(sizes - now))) <= 2
-        if near.sum() < 2:
+    def _learn_ripple(self, readings: _Readings) -> None:
+        """Ripple of all curves, also of those with lines, by one factor. Cells hide most of it: that is
+        noise of readings."""
+        now = {kind: max(one.ripple, LEAST_RIPPLE) for kind, one in self.own.items()}
+        tried = [{kind: times * size for kind, size in now.items()} for times in TIMES]
+        marginals = [(_log(self.before[kind].sum(axis=(0, 1, 2))), size) for kind, size in now.items()]
+        grid = np.log(RIPPLE[1:])
+        values = [np.mean([own[0] for own, _ in marginals])]
+        for times in TIMES[1:]:
+            values.append(
+                np.mean([np.interp(np.log(times * size), grid, own[1:]) for own, size in marginals])
+            )
+        probable = np.array(values) > max(values) - IMPROBABLE
+        if probable.sum() < 2:
             return
-        values = []
-        for size in sizes[near]:
-            own = {**self.own, **{kind: replace(self.own[kind], **{part: size}) for kind in kinds}}
-            values.append(evidence(readings.normal(own), *readings.prior.precision(_classes(own))))
-        size = _expected(sizes[near], values + marginal[near])
-        self.own.update({kind: replace(self.own[kind], **{part: size}) for kind in kinds})
+        for k in np.flatnonzero(probable).tolist():
+            values[k] += readings.evidence(
+                {kind: replace(self.own[kind], ripple=size) for kind, size in tried[k].items()}
+            )
+        times = _expected(np.array(TIMES)[probable], np.array(values)[probable])
+        self.own = {kind: replace(one, ripple=times * now[kind]) for kind, one in self.own.items()}
+
+    def _learn_steps(self, readings: _Readings, kinds: Sequence[str]) -> None:
+        """Steps of curves without lines, alike in all classes. Cells hide some of them, too."""
+        values = _log(np.mean([self.before[kind].sum(axis=(0, 1, 3)) for kind in kinds], axis=0))
+        near = np.ones(len(STEPS), bool)
+        if self.heard:
+            near = np.abs(np.arange(len(STEPS)) - np.argmin(np.abs(STEPS - self.own[kinds[0]].steps))) <= 2
+        for k in np.flatnonzero(near).tolist():
+            changed = {kind: replace(self.own[kind], steps=STEPS[k]) for kind in kinds}
+            values[k] += readings.evidence({**self.own, **changed})
+        size = _expected(STEPS[near], values[near])
+        self.own.update({kind: replace(self.own[kind], steps=size) for kind in kinds})
 
     def _learn_kinds(self, kinds: Sequence[str], score: Callable[[Mapping[str, _Character]], float]) -> None:
         """The kind of the smooth part is that of the machine."""
@@ -192,6 +216,7 @@ class _Readings:
     (n, curves) is the variance that curves hide at them, `each` the same where all hide a variance of 1."""
 
     prior: Prior
+    own: Mapping[str, _Character]
     lines: Normal
     chunk: Chunk
     precision: Array
@@ -199,7 +224,9 @@ class _Readings:
     each: Array
 
     @classmethod
-    def of(cls, prior: Prior, states: Sequence[State], theta: Array) -> _Readings | None:
+    def of(
+        cls, prior: Prior, own: Mapping[str, _Character], states: Sequence[State], theta: Array
+    ) -> _Readings | None:
         """None where there are only lines."""
         p, hidden = prior.parameters, prior.hidden
         unit = dict.fromkeys(hidden, Hidden(np.zeros(1), np.ones(1)))
@@ -217,7 +244,7 @@ class _Readings:
         each = [shares_of(state, theta, p, unit)[1] for state in thin]
         chunk = _joined([_joined(list(block.chunks())) for block in blocks], apart=True)
         precision = np.concatenate([block.precision for block in blocks])
-        return cls(prior, lines, chunk, precision, np.concatenate(now), np.concatenate(each))
+        return cls(prior, dict(own), lines, chunk, precision, np.concatenate(now), np.concatenate(each))
 
     def normal(self, own: Mapping[str, _Character]) -> Normal:
         """All of them, with noise as curves of such characters make it."""
@@ -227,19 +254,22 @@ class _Readings:
             if shape is None:
                 variance = variance + self.each[:, k] * one.variance[0]
             else:
-                more = change_of_ripple(shape.scales, own[class_of(name)].ripple, name)
-                variance = variance + np.maximum(self.now[:, k] + self.each[:, k] * more, 0.0)
+                times = own[class_of(name)].ripple / self.own[class_of(name)].ripple
+                more = self.each[:, k] * _more(shape.scales, times)
+                variance = variance + np.maximum(self.now[:, k] + more, 0.0)
         normal = replace(self.lines, H=self.lines.H.copy(), g=self.lines.g.copy())
         chunk = replace(self.chunk, sigma=np.sqrt(variance))
         normal.add(Block.of(chunk, np.arange(len(normal.g)), self.precision))
         return normal
 
+    def evidence(self, own: Mapping[str, _Character]) -> float:
+        """The log evidence of all of them under curves of such characters, up to a constant."""
+        return evidence(self.normal(own), *self.prior.precision(_classes(own)))
 
-def change_of_ripple(scales: Scales, ripple: float, name: str) -> float:
-    """By how much more variance cells hide of a curve of such scales where its ripple is another one, given
-    as root mean square in mm of positioning."""
-    before, after = scales.ripple * rms_of_processes()[3], ripple * USUAL[class_of(name)]
-    return float(SHORT * (after**2 - before**2))
+
+def _more(scales: Scales, times: float) -> float:
+    """By how much more variance cells hide of a curve of such scales with so many times its ripple."""
+    return float(SHORT * (times**2 - 1.0) * (scales.ripple * rms_of_processes()[3]) ** 2)
 
 
 def _classes(own: Mapping[str, _Character]) -> dict[str, Class]:
