@@ -102,7 +102,7 @@ def fit(
 
     def attempt(cells: int, before: _Settled | None = None) -> tuple[Fit, _Settled]:
         start = _start(measurements, chain, travel_mm, datum_mm, tell, cells)
-        unread, learning = Unread(start.model.others), LEARNING
+        unread, learning = Unread(start.model.others, bool(start.model.shapes)), LEARNING
         if before is not None:
             start = replace(start, states=before.states, outliers=before.outliers)
             unread, learning = before.unread, 1

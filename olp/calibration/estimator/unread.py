@@ -7,6 +7,7 @@ It is mostly shorter than any cell. So it is noise of readings, and uncertainty 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, fields, replace
@@ -40,8 +41,8 @@ STRAIGHT = {"positioning": 3.0, "straightness": 1.5, "angle": 1.5}
 SIZE_BEFORE = 0.03, 0.8
 #: How far classes differ from what they usually are to each other, as a standard deviation of a logarithm.
 RELATED = 0.8
-#: Each is learnt so often the first time, given the others.
-SWEEPS = 2
+#: Candidates to begin with: kinds of smooth parts, sizes, steps, ripple, by their number.
+FEW = (0, 1, 3), (2, 4, 6), (0, 3, 5), (0, 2, 4)
 #: Readings from which all this is learnt, at most: more say the same.
 ENOUGH = 1000
 #: Logarithm of how much less probable candidates are, before readings beside lines, that are not tried.
@@ -73,20 +74,17 @@ class _Character:
 @dataclass(slots=True)
 class Unread:
     """Curves without lines. `before` holds the probabilities of their characters by class, as the curves with
-    lines show them."""
+    lines show them, if `lined`."""
 
     before: Mapping[str, Array]
+    lined: bool
     own: dict[str, _Character] = field(init=False)
-    lined: bool = field(init=False)
     first: dict[str, _Character] = field(init=False)
     sized: bool = field(init=False)
     heard: bool = field(init=False)
 
     def __post_init__(self) -> None:
         self.own = {kind: _Character(*_expectations(table)) for kind, table in self.before.items()}
-        sizes = [table.sum(axis=(0, 2, 3)) for table in self.before.values()]
-        # before any reading all sizes are alike
-        self.lined = any(np.ptp(share) > 0.01 for share in sizes)
         self.sized, self.heard = self.lined, False
         if not self.lined:
             middle, spread = SIZE_BEFORE
@@ -116,13 +114,12 @@ class Unread:
         if not kinds and not prior.shapes:
             return False
         if not self.sized:
-            self._size_all(readings, kinds)
-        for _ in range(1 if self.heard or not kinds else SWEEPS):
-            self._learn_ripple(readings)
-            if kinds:
-                self._sweep(readings, kinds)
-                self._learn_steps(readings, kinds)
-            self.sized = self.heard = True
+            self._find(readings, kinds)
+        self._learn_ripple(readings)
+        if kinds:
+            self._sweep(readings, kinds)
+            self._learn_steps(readings, kinds)
+        self.sized = self.heard = True
         return True
 
     def shapes(self, shapes: Mapping[str, Shape]) -> Mapping[str, Shape]:
@@ -142,12 +139,30 @@ class Unread:
         normal = readings.normal(self.own)
         return lambda changed: evidence(normal, *readings.prior.precision(_classes({**self.own, **changed})))
 
-    def _size_all(self, readings: _Readings, kinds: Sequence[str]) -> None:
-        """One size for all classes, to begin with."""
-        score = self._score(readings)
-        tried = [{kind: replace(self.own[kind], size=size) for kind in kinds} for size in SIZES]
-        values = [score(one) + _about(size, *SIZE_BEFORE) for one, size in zip(tried, SIZES, strict=True)]
-        self.own.update(tried[int(np.argmax(values))])
+    def _find(self, readings: _Readings, kinds: Sequence[str]) -> None:
+        """Where to begin, all classes alike: the most probable of few candidates of everything together. What
+        explains kinks is either of a rough kind or full of steps, and from one the other is not found."""
+        tables = [self.before[kind] for kind in kinds]
+        marginals = [
+            _log(np.mean([table.sum(axis=axes) for table in tables], axis=0))
+            for axes in ((1, 2, 3), (0, 1, 3), (0, 1, 2))
+        ]
+        best, most = self.own, -math.inf
+        pure = np.eye(len(SMOOTH))
+        for j, k in itertools.product(*FEW[2:]):
+            rough = {
+                kind: replace(one, steps=float(STEPS[j]), ripple=float(RIPPLE[k]))
+                for kind, one in self.own.items()
+            }
+            normal = readings.normal(rough)
+            for i, size in itertools.product(FEW[0], SIZES[list(FEW[1])]):
+                smooth = tuple(pure[i].tolist())
+                own = {**rough, **{kind: replace(rough[kind], kinds=smooth, size=size) for kind in kinds}}
+                value = evidence(normal, *readings.prior.precision(_classes(own)))
+                value += marginals[0][i] + marginals[1][j] + marginals[2][k] + _about(size, *SIZE_BEFORE)
+                if value > most:
+                    best, most = own, value
+        self.own = best
 
     def _sweep(self, readings: _Readings, kinds: Sequence[str]) -> None:
         score = self._score(readings)
@@ -181,7 +196,7 @@ class Unread:
         """Steps of curves without lines, alike in all classes. Cells hide some of them, too."""
         values = _log(np.mean([self.before[kind].sum(axis=(0, 1, 3)) for kind in kinds], axis=0))
         near = np.ones(len(STEPS), bool)
-        if self.heard:
+        if self.heard or self.own[kinds[0]].steps in STEPS:
             near = np.abs(np.arange(len(STEPS)) - np.argmin(np.abs(STEPS - self.own[kinds[0]].steps))) <= 2
         for k in np.flatnonzero(near).tolist():
             changed = {kind: replace(self.own[kind], steps=STEPS[k]) for kind in kinds}
