@@ -42,11 +42,11 @@ SIZE_BEFORE = 0.03, 0.8
 #: How far classes differ from what they usually are to each other, as a standard deviation of a logarithm.
 RELATED = 0.8
 #: Candidates to begin with: kinds of smooth parts, sizes, steps, ripple, by their number.
-FEW = (0, 1, 3), (2, 4, 6), (0, 3, 5), (0, 2, 4)
+FEW = (0, 1, 3), (2, 4, 6), (0, 3), (0, 2, 4)
 #: Readings from which all this is learnt, at most: more say the same.
 ENOUGH = 1000
-#: Logarithm of how much less probable candidates are, before readings beside lines, that are not tried.
-IMPROBABLE = 9.0
+#: Where all curves have lines: logarithm of how much less probable factors are that are not tried.
+IMPROBABLE = 5.0
 #: Factors of ripple that are tried, and the least ripple that they multiply, mm.
 TIMES = 0.0, 0.125, 0.25, 0.5, 1.0, 2.0
 LEAST_RIPPLE = 2e-4
@@ -111,11 +111,11 @@ class Unread:
                 for name, part in p.slices.items() if name in p.spaces
             )
         ]  # fmt: skip
-        if not kinds and not prior.shapes:
+        if not kinds and (self.heard or not prior.shapes):
             return False
         if not self.sized:
             self._find(readings, kinds)
-        self._learn_ripple(readings)
+        self._learn_ripple(readings, math.inf if kinds else IMPROBABLE)
         if kinds:
             self._sweep(readings, kinds)
             self._learn_steps(readings, kinds)
@@ -170,7 +170,7 @@ class Unread:
         for kind in kinds:
             self._learn_size(kind, score)
 
-    def _learn_ripple(self, readings: _Readings) -> None:
+    def _learn_ripple(self, readings: _Readings, bound: float) -> None:
         """Ripple of all curves, also of those with lines, by one factor. Cells hide most of it: that is
         noise of readings."""
         now = {kind: max(one.ripple, LEAST_RIPPLE) for kind, one in self.own.items()}
@@ -182,7 +182,7 @@ class Unread:
             values.append(
                 np.mean([np.interp(np.log(times * size), grid, own[1:]) for own, size in marginals])
             )
-        probable = np.array(values) > max(values) - IMPROBABLE
+        probable = np.array(values) > max(values) - bound
         if probable.sum() < 2:
             return
         for k in np.flatnonzero(probable).tolist():
@@ -197,7 +197,8 @@ class Unread:
         values = _log(np.mean([self.before[kind].sum(axis=(0, 1, 3)) for kind in kinds], axis=0))
         near = np.ones(len(STEPS), bool)
         if self.heard or self.own[kinds[0]].steps in STEPS:
-            near = np.abs(np.arange(len(STEPS)) - np.argmin(np.abs(STEPS - self.own[kinds[0]].steps))) <= 2
+            near = np.abs(np.arange(len(STEPS)) - np.argmin(np.abs(STEPS - self.own[kinds[0]].steps)))
+            near = near <= (1 if self.heard else 2)
         for k in np.flatnonzero(near).tolist():
             changed = {kind: replace(self.own[kind], steps=STEPS[k]) for kind in kinds}
             values[k] += readings.evidence({**self.own, **changed})

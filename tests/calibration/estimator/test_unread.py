@@ -14,6 +14,7 @@ from olp.calibration.estimator.between import Hidden, beside_cells, in_cells, wi
 from olp.calibration.estimator.character import USUAL, candidates, of_others, rms_of_processes
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.normal import Block, Chunk, Normal, evidence
+from olp.calibration.estimator.unread import STRAIGHT
 from olp.calibration.observations.points import Points, PointsState
 
 #: mm per um.
@@ -35,6 +36,8 @@ def test_lengths_tell_waves_of_screws_from_smooth_curves_and_bands_cover_both() 
     for family, least, most in (("smooth", 0.0, 0.3 * UM), ("screws", 2.0 * UM, 5.0 * UM)):
         machine, fitted = fitted_to(family, "stations")
         assert least <= ripple_of(fitted, "angle") < most
+        # sizes are those of machines, too, though bows of any size fit as well
+        assert 6.0 * UM < fitted.prior.classes["straightness"][0] / STRAIGHT["straightness"] / 0.4 < 40.0 * UM
         position, tool = np.random.default_rng(3).uniform(*machine.box.T, (200, 3)), np.array(FRESH[1])
         off = np.abs(fitted.error(position, tool) - machine.error(position, tool))
         sigma = fitted.sigma(position, tool)
