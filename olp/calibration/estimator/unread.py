@@ -34,9 +34,9 @@ from olp.calibration.observations.radial import AlongState
 from olp.core.arrays import Array
 from olp.core.values import dataclass
 
-#: The straight part of a curve against the smooth rest, root mean squares. Positioning has a scale of its
+#: The straight part of a curve against a usual smooth part, or a larger one. Positioning has a scale of its
 #: own, of screws, racks and temperature.
-STRAIGHT = {"positioning": 3.0, "straightness": 1.5, "angle": 1.5}
+STRAIGHT = {"positioning": 4.0, "straightness": 3.0, "angle": 3.0}
 #: Smooth part of positioning before any reading, mm, and the standard deviation of its logarithm.
 SIZE_BEFORE = 0.03, 0.8
 #: How far classes differ from what they usually are to each other, as a standard deviation of a logarithm.
@@ -47,6 +47,8 @@ FEW = (0, 1, 3), (2, 4, 6), (0, 3), (0, 2, 4)
 ENOUGH = 1000
 #: Where all curves have lines: logarithm of how much less probable factors are that are not tried.
 IMPROBABLE = 5.0
+#: Logarithm of the probability of ripple above all candidates.
+NONE = -1e3
 #: Factors of ripple that are tried, and the least ripple that they multiply, mm.
 TIMES = 0.0, 0.125, 0.25, 0.5, 1.0, 2.0
 LEAST_RIPPLE = 2e-4
@@ -68,7 +70,9 @@ class _Character:
         row = np.zeros(7)
         row[list(SMOOTH)] = np.sqrt(self.kinds) * self.size
         row[[2, 3]] = self.steps, self.ripple
-        return STRAIGHT[kind] * self.size * USUAL[kind], Scales.of(USUAL[kind] * row / rms_of_processes())
+        # a curve of steps or kinks alone has a small smooth part, and leans as others do
+        straight = STRAIGHT[kind] * max(self.size, SIZE_BEFORE[0])
+        return straight * USUAL[kind], Scales.of(USUAL[kind] * row / rms_of_processes())
 
 
 @dataclass(slots=True)
@@ -180,7 +184,9 @@ class Unread:
         values = [np.mean([own[0] for own, _ in marginals])]
         for times in TIMES[1:]:
             values.append(
-                np.mean([np.interp(np.log(times * size), grid, own[1:]) for own, size in marginals])
+                np.mean(
+                    [np.interp(np.log(times * size), grid, own[1:], right=NONE) for own, size in marginals]
+                )
             )
         probable = np.array(values) > max(values) - bound
         if probable.sum() < 2:

@@ -100,7 +100,7 @@ def test_nothing_is_invented_on_rigid_machines(family: str, seed: int) -> None:
 @pytest.mark.slow
 def test_noise_that_was_stated_too_small_is_no_field() -> None:
     """It is more than what curves hide between positions."""
-    points = cloud(simulated.machine(203, "smooth"), 203, 120, 20.0)
+    points = cloud(simulated.machine(203, "smooth"), 203, 120, 50.0)
     lying = dataclasses.replace(points, sigma=0.5 * points.sigma)
     result = nonrigid(fit(Measurements("simulated", (lying,)), "FXYZ"))
     assert not result.processes
