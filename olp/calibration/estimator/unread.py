@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -305,12 +306,18 @@ def _rows(state: ScatteredState | AlongState) -> int:
 
 def _thinned(state: ScatteredState | AlongState, every: int) -> ScatteredState | AlongState:
     """A state with every so many of its readings."""
-    taken, n = state.observation, state.count
     if every == 1 or not isinstance(state, ScatteredState):
         return state
+    whole: Any = state
+    taken: Any = state.observation
     columns = {one.name: getattr(taken, one.name) for one in fields(taken)}
-    fewer = {name: v[::every] for name, v in columns.items() if isinstance(v, np.ndarray) and len(v) == n}
-    return replace(state, observation=replace(taken, **fewer))
+    fewer = {
+        name: value[::every]
+        for name, value in columns.items()
+        if isinstance(value, np.ndarray) and len(value) == state.count
+    }
+    thin: ScatteredState = replace(whole, observation=replace(taken, **fewer))
+    return thin
 
 
 def _joined(chunks: Sequence[Chunk], *, apart: bool = False) -> Chunk:
