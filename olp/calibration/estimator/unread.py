@@ -31,7 +31,6 @@ from olp.calibration.estimator.normal import Block, Chunk, Normal, evidence
 from olp.calibration.estimator.prior import Class, Prior
 from olp.calibration.estimator.smoothing import Shape
 from olp.calibration.observations.base import ScatteredState, State
-from olp.calibration.observations.radial import AlongState
 from olp.core.arrays import Array
 from olp.core.values import dataclass
 
@@ -250,15 +249,16 @@ class _Readings:
     def of(
         cls, prior: Prior, own: Mapping[str, _Character], states: Sequence[State], theta: Array
     ) -> _Readings | None:
-        """None where there are only lines."""
+        """None where no readings are scattered."""
         p, hidden = prior.parameters, prior.hidden
         unit = dict.fromkeys(hidden, Hidden(np.zeros(1), np.ones(1)))
-        wide = [state for state in states if isinstance(state, ScatteredState | AlongState)]
+        # readings along lines and circles are repeated, or near each other: they see no independent ripple
+        wide = [state for state in states if isinstance(state, ScatteredState)]
         if not wide:
             return None
         lines = Normal.of(p.size)
         for state in states:
-            if not isinstance(state, ScatteredState | AlongState):
+            if not isinstance(state, ScatteredState):
                 lines.add(block_of(state, theta, p, hidden))
         prior.push(lines)
         every = math.ceil(sum(_rows(state) for state in wide) / ENOUGH)
@@ -299,14 +299,13 @@ def _classes(own: Mapping[str, _Character]) -> dict[str, Class]:
     return {kind: one.of(kind) for kind, one in own.items()}
 
 
-def _rows(state: ScatteredState | AlongState) -> int:
-    n = state.count
-    return len(state.spread_over_rows(np.ones(n, np.int64))) if isinstance(state, ScatteredState) else n
+def _rows(state: ScatteredState) -> int:
+    return len(state.spread_over_rows(np.ones(state.count, np.int64)))
 
 
-def _thinned(state: ScatteredState | AlongState, every: int) -> ScatteredState | AlongState:
+def _thinned(state: ScatteredState, every: int) -> ScatteredState:
     """A state with every so many of its readings."""
-    if every == 1 or not isinstance(state, ScatteredState):
+    if every == 1:
         return state
     whole: Any = state
     taken: Any = state.observation
