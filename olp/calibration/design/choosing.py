@@ -146,8 +146,8 @@ def _took(knowledge: _Knowledge, criterion: Criterion) -> int:
 def standardised(block: Block) -> tuple[Array, Array]:
     """(rows, local) of all readings of a block over their noise."""
     chunks = list(block.chunks())
-    rows = np.concatenate([chunk.rows / chunk.sigma[:, None] for chunk in chunks])
-    return rows, np.concatenate([chunk.local / chunk.sigma[:, None] for chunk in chunks])
+    rows = np.concatenate([chunk.standardised(chunk.rows) for chunk in chunks])
+    return rows, np.concatenate([chunk.standardised(chunk.local) for chunk in chunks])
 
 
 def alone(rows: Array, local: Array, precision: Array) -> Array:

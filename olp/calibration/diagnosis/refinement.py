@@ -87,8 +87,8 @@ def refine(
         normal = Normal.of(parts.columns)
         normal.add(block)
         solved = solve(normal, np.eye(parts.columns))
-        _, residual, spread = residuals_of(block, solved.theta)
-        off = np.abs(residual / spread).reshape(-1, 3).max(axis=1)
+        _, residual, standardised = residuals_of(block, solved.theta)
+        off = np.abs(standardised).reshape(-1, 3).max(axis=1)
         worst = int(np.argmax(off))
         if off[worst] <= OUTLIER or len(outliers) >= SHARE * len(misses):
             break

@@ -2,17 +2,18 @@
 
 A tip at a position that no line read has an error that the unknowns do not hold: a wave of a screw, a dent.
 Its variance is known (`between.Hidden`). It is no mistake of the reading, so it counts as its noise. Readings
-at one position see the same of it: repeating them does not average it.
+at one position see the same of it: repeating them does not average it, and they differ by their noise alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from olp.calibration.estimator.between import Hidden
-from olp.calibration.estimator.normal import Block, Chunk
+from olp.calibration.estimator.normal import Block, Chunk, Index
 from olp.calibration.estimator.parameters import CROSS, Parameters, Unknowns
 from olp.calibration.observations.base import ScatteredState, State
 from olp.calibration.observations.radial import AlongState
@@ -20,8 +21,8 @@ from olp.core.arrays import Array
 from olp.core.units import AXES
 from olp.core.values import dataclass
 
-#: Readings at positions nearer than this are at one position, mm.
-_SAME_MM = 1e-3
+#: Readings whose rows are nearer than this share of the largest are equal.
+_SAME = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,15 +49,20 @@ class _Beside:
                 if "ABC"[angle] == name[1]:
                     arm = self.parameters.lever_arm(row, axis, lever, position, tool)
                     table[:, row, column] = sign * sigma * arm
-        table *= np.sqrt(_repeated(position))[:, None, None]
         return np.concatenate([self.unknowns.design(position, tool), table], axis=2)
 
 
-def _repeated(position: Array) -> Array:
-    """(n,) how many positions are at the same place as each of positions (n, 3)."""
-    rounded = np.round(position / _SAME_MM).astype(np.int64)
-    _, inverse, counts = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
-    return np.asarray(counts[inverse.reshape(-1)])
+def _groups(rows: Array) -> Index:
+    """(n,) the group of each of rows (n, k), which are equal: the same position, tool and direction."""
+    # two projections tell rows apart, whatever they hold
+    first, second = (rows @ np.random.default_rng(9).normal(size=(rows.shape[1], 2))).T
+    order = np.lexsort((second, first))
+    new = np.zeros(len(rows), bool)
+    for key in (first, second):
+        new[1:] |= np.abs(np.diff(key[order])) > _SAME * np.abs(key).max(initial=0.0)
+    group = np.empty(len(rows), np.intp)
+    group[order] = np.cumsum(new)
+    return group
 
 
 def block_of(
@@ -72,8 +78,8 @@ def block_of(
 
     def chunks() -> Iterator[Chunk]:
         for chunk in whole.chunks():
-            beside = np.sqrt((chunk.rows[:, size:] ** 2).sum(axis=1))
-            yield Chunk(chunk.rows[:, :size], chunk.y, np.hypot(chunk.sigma, beside), chunk.local)
+            own, beside = chunk.rows[:, :size], np.sqrt((chunk.rows[:, size:] ** 2).sum(axis=1))
+            yield replace(chunk, rows=own, beside=beside, group=_groups(own))
 
     return Block(np.arange(size), whole.precision, chunks, whole.label)
 
@@ -81,10 +87,11 @@ def block_of(
 def shares_of(
     state: ScatteredState | AlongState, theta: Array, parameters: Parameters, hidden: Mapping[str, Hidden]
 ) -> tuple[Block, Array]:
-    """The readings of a state without that noise, and (n, curves) the variance that each curve adds."""
+    """The readings of a state without that noise, in their groups, and (n, curves) the variance that each
+    curve adds."""
     whole, size = _whole(state, theta, parameters, hidden, parameters)
     chunks = list(whole.chunks())
-    plain = [Chunk(chunk.rows[:, :size], chunk.y, chunk.sigma, chunk.local) for chunk in chunks]
+    plain = [replace(c, rows=c.rows[:, :size], group=_groups(c.rows[:, :size])) for c in chunks]
     shares = np.concatenate([chunk.rows[:, size:] for chunk in chunks]) ** 2
     return Block(np.arange(size), whole.precision, lambda: plain, whole.label), shares
 

@@ -20,12 +20,42 @@ Index = npt.NDArray[np.intp]
 @dataclass(frozen=True, slots=True, eq=False)
 class Chunk:
     """Some readings of a block: y (n,) = rows (n, k) @ theta[columns] + local (n, l) @ nu + noise of standard
-    deviation sigma (n,)."""
+    deviation sigma (n,) + what no unknown holds, of standard deviation `beside` (n,). Readings of one `group`
+    (n,) see the same of that: how they differ is noise alone."""
 
     rows: Array
     y: Array
     sigma: Array
     local: Array
+    beside: Array | None = None
+    group: Index | None = None
+
+    def standardised(self, values: Array) -> Array:
+        """Values (n, c) of the readings in standard deviations, freed of what readings have in common: the
+        inverse of the symmetric root of their covariance, group by group, times them."""
+        scaled = np.asarray(values / self.sigma[:, None])
+        if self.beside is None or self.group is None:
+            return scaled
+        ratio = self.beside / self.sigma
+        power = np.bincount(self.group, ratio**2)[self.group]
+        several = np.bincount(self.group)[self.group] > 1
+        scaled[~several] /= np.sqrt(1.0 + power[~several])[:, None]
+        order = np.flatnonzero(several & (power > 0.0))
+        if order.size:
+            order = order[np.argsort(self.group[order], kind="stable")]
+            new = np.diff(self.group[order], prepend=-1) != 0
+            common = np.add.reduceat(ratio[order, None] * scaled[order], np.flatnonzero(new), axis=0)
+            less = ratio[order] * (1.0 - 1.0 / np.sqrt(1.0 + power[order])) / power[order]
+            scaled[order] -= less[:, None] * common[np.cumsum(new) - 1]
+        return scaled
+
+    @property
+    def log_sigma(self) -> float:
+        """Half the logarithm of the determinant of their covariance."""
+        size = float(np.log(self.sigma).sum())
+        if self.beside is None or self.group is None:
+            return size
+        return size + 0.5 * float(np.log1p(np.bincount(self.group, (self.beside / self.sigma) ** 2)).sum())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,11 +99,10 @@ class Normal:
         k, m = len(block.columns), len(block.precision)
         gram = np.zeros((k + m + 1, k + m + 1))
         for chunk in block.chunks():
-            table = np.concatenate([chunk.rows, chunk.local, chunk.y[:, None]], axis=1)
-            table /= chunk.sigma[:, None]
+            table = chunk.standardised(np.concatenate([chunk.rows, chunk.local, chunk.y[:, None]], axis=1))
             gram += table.T @ table
             self.count += len(chunk.y)
-            self.log_noise += float(np.log(chunk.sigma).sum())
+            self.log_noise += chunk.log_sigma
         kept = [*range(k), k + m]
         inner = gram[k : k + m, k : k + m] + np.diag(block.precision)
         outer = gram[np.ix_(kept, range(k, k + m))]
@@ -86,16 +115,20 @@ class Normal:
 
 
 def residuals_of(block: Block, theta: Array) -> tuple[Array, Array, Array]:
-    """(nu, residuals, their standard deviations) of all readings of a block at the solution."""
+    """(nu, residuals, standardised residuals) of all readings of a block at the solution."""
     own = theta[block.columns]
     inner, right = np.diag(block.precision), np.zeros(len(block.precision))
+    rest, standardised = [], []
     for chunk in block.chunks():
-        weighted = chunk.local / chunk.sigma[:, None]
-        inner = inner + weighted.T @ weighted
-        right = right + weighted.T @ ((chunk.y - chunk.rows @ own) / chunk.sigma)
+        off = (chunk.y - chunk.rows @ own)[:, None]
+        weighted = chunk.standardised(np.concatenate([chunk.local, off], axis=1))
+        inner = inner + weighted[:, :-1].T @ weighted[:, :-1]
+        right = right + weighted[:, :-1].T @ weighted[:, -1]
+        rest.append(np.concatenate([chunk.local, off], axis=1))
+        standardised.append(weighted)
     nu = np.asarray(np.linalg.solve(inner, right))
-    rest = [chunk.y - chunk.rows @ own - chunk.local @ nu for chunk in block.chunks()]
-    return nu, np.concatenate(rest), np.concatenate([chunk.sigma for chunk in block.chunks()])
+    less = np.append(-nu, 1.0)
+    return nu, np.concatenate(rest) @ less, np.concatenate(standardised) @ less
 
 
 @dataclass(frozen=True, slots=True, eq=False)

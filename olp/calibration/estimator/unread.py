@@ -271,7 +271,7 @@ class _Readings:
 
     def normal(self, own: Mapping[str, _Character]) -> Normal:
         """All of them, with noise as curves of such characters make it."""
-        variance = self.chunk.sigma**2
+        variance = np.zeros(len(self.chunk.y))
         for k, (name, one) in enumerate(self.prior.hidden_of(_classes(own)).items()):
             shape = self.prior.shapes.get(name)
             if shape is None:
@@ -281,7 +281,7 @@ class _Readings:
                 more = self.each[:, k] * _more(shape.scales, times)
                 variance = variance + np.maximum(self.now[:, k] + more, 0.0)
         normal = replace(self.lines, H=self.lines.H.copy(), g=self.lines.g.copy())
-        chunk = replace(self.chunk, sigma=np.sqrt(variance))
+        chunk = replace(self.chunk, beside=np.sqrt(variance))
         normal.add(Block.of(chunk, np.arange(len(normal.g)), self.precision))
         return normal
 
@@ -325,15 +325,18 @@ def _joined(chunks: Sequence[Chunk], *, apart: bool = False) -> Chunk:
         np.concatenate([getattr(chunk, name) for chunk in chunks]) for name in ("rows", "y", "sigma")
     )
     local = [chunk.local for chunk in chunks]
+    own = [np.zeros(0, np.intp) if chunk.group is None else chunk.group for chunk in chunks]
+    before = np.cumsum([0, *(1 + int(part.max(initial=-1)) for part in own)])
+    group = np.concatenate([part + first for part, first in zip(own, before, strict=False)])
     if not apart:
-        return Chunk(rows, y, sigma, np.concatenate(local))
+        return Chunk(rows, y, sigma, np.concatenate(local), group=group)
     whole = np.zeros((len(y), sum(part.shape[1] for part in local)))
     row = column = 0
     for part in local:
         n, m = part.shape
         whole[row : row + n, column : column + m] = part
         row, column = row + n, column + m
-    return Chunk(rows, y, sigma, whole)
+    return Chunk(rows, y, sigma, whole, group=group)
 
 
 def _expectations(table: Array) -> tuple[tuple[float, ...], float, float, float]:

@@ -204,8 +204,8 @@ class Adjustment:
 
 
 def _table(chunk: Chunk, use: np.ndarray) -> Array:
-    table = np.concatenate([chunk.rows, chunk.local, chunk.y[:, None]], axis=1)[use]
-    return np.asarray(table / chunk.sigma[use, None])
+    table = np.concatenate([chunk.rows, chunk.local, chunk.y[:, None]], axis=1)
+    return np.asarray(chunk.standardised(table)[use])
 
 
 def _folds(state: ScatteredState) -> Index:

@@ -232,9 +232,7 @@ def adjusted(model: Model, starts: Sequence[Start], most: int = _STEPS) -> Joint
             raise _unsettled(model) from None
         new = theta if solved is None else theta + np.clip(solved.theta - theta, -longest, longest)
         sigma = np.ones(0) if solved is None else np.sqrt(np.diag(solved.covariance))
-        chi_square = sum(
-            float(np.sum((residuals_of(b, new)[1] / residuals_of(b, new)[2]) ** 2)) for b in blocks
-        )
+        chi_square = sum(float(np.sum(residuals_of(b, new)[2] ** 2)) for b in blocks)
         owns = [residuals_of(block, new)[0] for block in blocks]
         most_moved = float(np.max(np.abs(new - theta) / sigma, initial=0.0))
         theta, change, before = new, abs(chi_square - before), chi_square

@@ -254,16 +254,16 @@ T = TypeVar("T", bound=Scattered)
 
 def residual_and_chi_square(block: Block, theta: Array) -> tuple[Array, float]:
     """Residuals of a block and the sum of squares of the standardised ones."""
-    _, residual, sigma = residuals_of(block, theta)
-    return residual, float(np.sum((residual / sigma) ** 2))
+    _, residual, standardised = residuals_of(block, theta)
+    return residual, float(np.sum(standardised**2))
 
 
 def slips_of(block: Block, theta: Array, source: str, rows: Index, word: str) -> list[Outlier]:
     """Points whose residual is larger than noise, the worst ones first; `rows` (n,) are their lines in the
     file, and the block has as many rows for each."""
-    _, residual, sigma = residuals_of(block, theta)
+    _, residual, standardised = residuals_of(block, theta)
     rest = residual.reshape(len(rows), -1)
-    off = np.abs(residual / sigma).reshape(rest.shape).max(axis=1)
+    off = np.abs(standardised).reshape(rest.shape).max(axis=1)
     worst = np.argsort(-off)[: max(1, int(SHARE * len(off)))]
     return [
         Outlier(source, int(rows[k]), word, float(np.linalg.norm(rest[k])), float(off[k]))

@@ -30,8 +30,9 @@ def test_what_curves_hide_is_noise_of_points_with_their_lever_arms() -> None:
                 turned = np.eye(3)["XYZABC".index(name[1]) % 3]
                 moved = turned + 0.0 * arm if name[1] in "XYZ" else np.cross(turned, arm)
                 expected += hidden.at(position[:, axis])[:, None] * moved**2
-    assert chunk.sigma.reshape(6, 3) == pytest.approx(np.sqrt(expected), rel=1e-9)
-    assert chunk.sigma.min() > 1.5e-3
+    spread = np.hypot(chunk.sigma, np.asarray(chunk.beside))
+    assert spread.reshape(6, 3) == pytest.approx(np.sqrt(expected), rel=1e-9)
+    assert spread.min() > 1.5e-3
     assert chunk.rows.shape == (18, fitted.parameters.size)
 
 

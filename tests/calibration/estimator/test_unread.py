@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from cases import volumetric
@@ -86,18 +88,36 @@ def test_more_ripple_hides_nothing_at_the_datum_and_less_never_below_zero() -> N
 
 
 def test_readings_at_one_position_do_not_average_what_is_hidden_there() -> None:
-    """Ten readings of a place say no more of the places beside it than the hidden variance lets them."""
+    """Ten readings of a place say no more of the places beside it than the hidden variance lets them, and
+    differ from each other by their noise alone: as the dense Gaussian has it."""
     _, fitted = fitted_to("screws", "points")
     place = np.array([[900.0, 700.0, -300.0]])
-    once, often = np.tile(place, (4, 1)) + np.arange(4)[:, None], np.tile(place, (10, 1))
+    position = np.concatenate((place + np.arange(4)[:, None], np.tile(place, (10, 1))))
+    state = PointsState(Points(position, np.zeros(3), position, UM, known_frame=True))
+    (chunk,) = fitted.block(state).chunks()
+    assert chunk.beside is not None and chunk.beside.min() > 0.5 * UM
+    place_of = np.repeat([0, 1, 2, 3, *([0] * 10)], 3) * 3 + np.tile(np.arange(3), 14)
+    # noise differs from reading to reading, too
+    chunk = dataclasses.replace(chunk, sigma=UM * np.linspace(0.5, 2.0, len(place_of)))
+    common = (place_of[:, None] == place_of) * np.outer(chunk.beside, chunk.beside)
+    whole = np.diag(chunk.sigma**2) + common
+    root = chunk.standardised(np.eye(len(whole)))
+    assert root.T @ root @ whole == pytest.approx(np.eye(len(whole)), abs=1e-9)
+    assert chunk.log_sigma == pytest.approx(0.5 * np.linalg.slogdet(whole)[1])
 
-    def sigma(position: np.ndarray) -> np.ndarray:
-        state = PointsState(Points(position, np.zeros(3), position, 1e-6, known_frame=True))
-        (chunk,) = fitted.block(state).chunks()
-        return np.asarray(chunk.sigma.reshape(-1, 3)[0])
 
-    assert sigma(once).min() > 0.5 * UM
-    assert sigma(often) == pytest.approx(np.sqrt(10.0) * sigma(once), rel=0.02)
+def test_readings_of_one_place_that_contradict_each_other_are_no_ripple() -> None:
+    """A tracker that was moved by 30 um between two rounds of the same points, with no line beside it."""
+    machine = families.machine(0, "smooth")
+    first = volumetric.readings(machine, "points", 0).observations[0]
+    assert isinstance(first, Points)
+    moved = dataclasses.replace(
+        first, axis_mm=np.tile(first.axis_mm, (2, 1)), row=np.arange(2 * len(first.axis_mm)),
+        tool_mm=np.tile(np.broadcast_to(first.tool_mm, first.axis_mm.shape), (2, 1)),
+        measured_mm=np.concatenate((first.measured_mm, first.measured_mm + np.array([0.03, 0.0, 0.0]))),
+    )  # fmt: skip
+    fitted = fit(measurements_of(()).also((moved,)), machine.chain)
+    assert fitted.chi_square > 3.0 * fitted.freedom
 
 
 def test_the_evidence_counts_the_size_of_noise() -> None:
