@@ -79,9 +79,9 @@ def bent(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | None
 
 
 def lag(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
-    """(n, 3) how far commands for samples between waypoints lie behind the targets: one step of the iteration
-    where the error is small (then it is right to a few nanometres), two elsewhere; whatever the samples
-    beside it are."""
+    """(n, 3) how far commands for samples between waypoints lie behind the targets, whatever the samples
+    beside them are. It is one step of the iteration where the error is small, which is right to a few
+    nanometres, and two elsewhere."""
     error = model.error(target_mm, tool_mm, play)
     # mostly all are small, and NaN is not
     if np.max(error, initial=0.0) <= _SMALL_MM and np.min(error, initial=0.0) >= -_SMALL_MM:

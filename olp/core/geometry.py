@@ -209,9 +209,9 @@ def quarter_shares(start: Array, centre: Array, plane: Plane, sweep: Array, quar
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segments:
-    """(m,) segments by columns, so that distances of many points from each are cheap: where they `begin`, how
-    far they go `along` each axis, and the `inverse` of the square of their length, 0 of one without length or
-    to an unknown end."""
+    """(m,) segments by columns, so that distances of many points from each are cheap: where they `begin` and
+    how far they go `along` each axis. `inverse` is 1 over the square of their length, 0 of one without length
+    or to an unknown end."""
 
     begin: list[Array]
     along: list[Array]

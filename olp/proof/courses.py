@@ -22,7 +22,7 @@ _ASIDE = (-0.15, 0.0, 0.15)
 @dataclass(frozen=True, slots=True, eq=False)
 class Courses:
     """Nominal moves: (n, 3) where each should `begin` and its `goal`, with 0 along axes that are unknown at
-    its end, and the `segments` between these; (n,) its index among the `shapes` of arcs, -1 where it is
+    its end, and the `segments` between these. (n,) `arc` is its index among the `shapes`, -1 where it is
     straight."""
 
     begin: Array

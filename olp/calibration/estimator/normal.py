@@ -20,8 +20,8 @@ Index = npt.NDArray[np.intp]
 @dataclass(frozen=True, slots=True, eq=False)
 class Chunk:
     """Some readings of a block: y (n,) = rows (n, k) @ theta[columns] + local (n, l) @ nu + noise of standard
-    deviation sigma (n,) + what no unknown holds, of standard deviation `beside` (n,). Readings of one `group`
-    (n,) see the same of that: how they differ is noise alone."""
+    deviation sigma (n,). To that comes what no unknown holds, of standard deviation `beside` (n,). Readings
+    of one `group` (n,) see the same of it: how they differ is noise alone."""
 
     rows: Array
     y: Array
@@ -31,8 +31,8 @@ class Chunk:
     group: Index | None = None
 
     def standardised(self, values: Array) -> Array:
-        """Values (n, c) of the readings in standard deviations, freed of what readings have in common: the
-        inverse of the symmetric root of their covariance, group by group, times them."""
+        """Values (n, c) of the readings in standard deviations, so that no two go together any more: times
+        the inverse of a root of their covariance, group by group."""
         scaled = np.asarray(values / self.sigma[:, None])
         if self.beside is None or self.group is None:
             return scaled
