@@ -15,6 +15,7 @@ from olp.comparison.figures import Run
 from olp.comparison.nominal import nominal_of
 from olp.comparison.pairing import Pairing, beside, pair
 from olp.comparison.path import Path
+from olp.core.progress import silent
 from olp.files.config import load_job
 from olp.proof import deviation
 from olp.proof.deviation import Tracer
@@ -163,7 +164,7 @@ def test_figures_of_a_correction_show_what_the_proof_states(job: str, holes: boo
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(report, "_path_plots", kept)
-        report._predicted_plots(result, source, session, options)
+        report._predicted_plots(result, source, session, options, silent)
     between = {side: result.report["deviation"][side]["between"]["max_um"] for side in ("before", "after")}
     largest = result.report["verdict"]["numerical"]["largest_um"]
     for side, group in drawn.items():
