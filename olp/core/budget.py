@@ -28,9 +28,9 @@ class Budget:
     told: int = 0
 
     @classmethod
-    def of(cls, size: int, *, least: int, per_byte: float, message: str) -> Budget:
+    def of(cls, size: int, *, least: int, per_byte: float, message: str, tell: Progress = silent) -> Budget:
         """For an input of `size` bytes: `least`, or so much for each byte where that is more."""
-        return cls(max(least, int(per_byte * size)), message)
+        return cls(max(least, int(per_byte * size)), message, tell)
 
     @classmethod
     def of_run(
@@ -38,7 +38,7 @@ class Budget:
     ) -> Budget:
         """For what a parametric program of `size` bytes makes: `limit`, or `RUN_PER_BYTE` where that is
         more."""
-        return cls(max(limit, RUN_PER_BYTE * size), message, tell)
+        return cls.of(size, least=limit, per_byte=RUN_PER_BYTE, message=message, tell=tell)
 
     @property
     def left(self) -> int:
