@@ -130,7 +130,7 @@ def test_a_line_that_shows_a_dialect_is_no_plain_block(line: str) -> None:
 
 def test_a_text_of_plain_blocks_is_plain() -> None:
     assert is_plain(b"N10 G1 X-1.5Y+.5 Z2. F1E3 (L X+1 R0 FMAX)\r\nM30\n")
-    for odd in (b"G1 X", b"G1 X Y1", b"GO", b"_", b"G641", b"X\xc41", b"X1;", b"%"):
+    for odd in (b"G1 X", b"G1 X Y1", b"GO", b"GOX1", b"_", b"G641", b"X\xc41", b"X1;", b"%"):
         assert not is_plain(odd) and not is_plain(b"G0 X1\n" + odd + b"\nG0")
 
 
