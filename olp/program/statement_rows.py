@@ -3,12 +3,13 @@ the whole text, and at the end the `Program`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
+from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Frame, Kind
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect
@@ -29,6 +30,8 @@ from olp.program.text.statements import Chunk, Field, Statement, is_cards
 #: Powers of ten by their exponent: those of the decimals of a number.
 _POW10 = 10.0 ** np.arange(19)
 _NONE = (-1, -1, -1)
+#: Refused by a table of statements, wherever the statement is.
+NOT_READ = "OLP512"
 #: columns of cards and of old terminals: a text within one of these widths is kept within it
 _WIDTHS = (72, 80)
 
@@ -71,6 +74,24 @@ class Points:
 
     def __len__(self) -> int:
         return len(self.line)
+
+
+def in_order(
+    events: Sequence[Statement],
+    points: Points,
+    event: Callable[[Statement, int], None],
+    by_table: Callable[[Statement], ProgramError | None],
+) -> None:
+    """Takes each statement between the points of a chunk, with the row of the point behind it. A refusal by
+    the table of statements names the later ones, too."""
+    rows = np.searchsorted(points.line, np.array([one.line for one in events], np.int64)).tolist()
+    for k, (statement, row) in enumerate(zip(events, rows, strict=True)):
+        try:
+            event(statement, row)
+        except ProgramError as error:
+            if error.code == NOT_READ:
+                error.others = tuple(filter(None, map(by_table, events[k + 1 :])))
+            raise
 
 
 #: A point that was read singly: its words, its numbers, its direction, and the words of that.

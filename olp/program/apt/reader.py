@@ -26,12 +26,10 @@ from olp.program.apt.table import FREE, TABLE
 from olp.program.dialect import Dialect, Options, Support
 from olp.program.frames import UP
 from olp.program.program import Program
-from olp.program.statement_rows import Point, Points
+from olp.program.statement_rows import NOT_READ, Point, Points, in_order
 from olp.program.text.statements import Chunk, Comment, Statement, chunks, shown
 
 NAN = float("nan")
-#: Refused by the table of statements, wherever it is.
-NOT_READ = "OLP512"
 _FREE = re.compile(rb"(?i)(?:" + b"|".join(FREE) + rb")(?![A-Z])")
 _CREO = re.compile(rb"\$\$->\s*([A-Z_]+)\s*/?")
 _RAPID = frozenset((b"RAPID", b"RAPID/"))
@@ -83,17 +81,10 @@ class _Reader(ArcMoves):
                 break
         self.points = collector.points(chunk, alone)
         self.done = 0
-        upto = np.searchsorted(self.points.line, np.array([e.line for e in events], np.int64)).tolist()
-        for k, (statement, row) in enumerate(zip(events, upto, strict=True)):
-            try:
-                self._event(statement, row)
-            except ProgramError as error:
-                if error.code == NOT_READ:
-                    error.others = tuple(filter(None, map(self._by_table, events[k + 1 :])))
-                raise
-            if self.ended:
-                collector.finish()
-                return
+        in_order(events, self.points, self._event, self._by_table)
+        if self.ended:
+            collector.finish()
+            return
         self._resolve(len(self.points))
         # what was stated for the point after the last one holds for the first of the next chunk
         count = len(self.points)

@@ -20,12 +20,10 @@ from olp.program.dmis.events import Events
 from olp.program.dmis.points import FORMS, INCREMENT, POLAR, POLAR_DEGREES, cartesian, restated
 from olp.program.dmis.table import TABLE
 from olp.program.program import Program
-from olp.program.statement_rows import Point
+from olp.program.statement_rows import NOT_READ, Point, in_order
 from olp.program.text.statements import Chunk, Comment, Statement, chunks, shown
 
 NAN = float("nan")
-#: Refused by the table of statements, wherever it is.
-NOT_READ = "OLP512"
 _NO_TEXT = re.compile(rb"(?!)")
 
 
@@ -72,16 +70,7 @@ class _Reader(Events):
                 break
         self.points = collector.points(chunk, alone)
         self.done = 0
-        upto = np.searchsorted(self.points.line, np.array([e.line for e in events], np.int64)).tolist()
-        for k, (statement, row) in enumerate(zip(events, upto, strict=True)):
-            try:
-                self._event(statement, row)
-            except ProgramError as error:
-                if error.code == NOT_READ:
-                    error.others = tuple(filter(None, map(self._by_table, events[k + 1 :])))
-                raise
-            if self.ended:
-                break
+        in_order(events, self.points, self._event, self._by_table)
         if not self.ended:
             self._resolve(len(self.points))
         collector.finish()
