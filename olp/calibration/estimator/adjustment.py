@@ -15,6 +15,7 @@ import numpy as np
 from olp.calibration.estimator.basis import Wave
 from olp.calibration.estimator.beside import block_of, shares_of
 from olp.calibration.estimator.fitted import Fit
+from olp.calibration.estimator.lined import Lined
 from olp.calibration.estimator.model import MOST, Model, artefacts_of
 from olp.calibration.estimator.normal import Block, Normal, Solved, solve
 from olp.calibration.estimator.parameters import Parameters
@@ -102,7 +103,8 @@ def fit(
 
     def attempt(cells: int, before: _Settled | None = None) -> tuple[Fit, _Settled]:
         start = _start(measurements, chain, travel_mm, datum_mm, tell, cells)
-        unread, learning = Unread(start.model.others, bool(start.model.shapes)), LEARNING
+        lined = Lined(start.model.shapes, start.model.hides)
+        unread, learning = Unread(start.model.others, lined), LEARNING
         if before is not None:
             start = replace(start, states=before.states, outliers=before.outliers)
             unread, learning = before.unread, 1
@@ -152,12 +154,11 @@ def _iterate(start: _Start, unread: Unread, learning: int, tell: Progress) -> _S
     for turn in range(PASSES):
         parameters = start.model.parameters(waves)
         squares = artefacts_of(start.measurements, parameters)
-        shapes = start.model.shapes
-        prior = Prior(parameters, unread.shapes(shapes), squares, unread.classes)
+        prior = Prior(parameters, unread.lined.shapes(), squares, unread.classes)
         theta = theta if len(theta) == parameters.size else np.zeros(parameters.size)
         # before the first pass the places of instruments are only near
         if turn < learning and unread.learn(prior, states, theta):
-            prior = Prior(parameters, unread.shapes(shapes), squares, unread.classes)
+            prior = Prior(parameters, unread.lined.shapes(), squares, unread.classes)
         blocks = [block_of(state, theta, parameters, prior.hidden) for state in states]
         tell("adjustment", 0.5)
         normal, solved = _adjusted(blocks, prior)

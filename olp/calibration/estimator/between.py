@@ -73,14 +73,6 @@ def in_cells(scales: Scales) -> Scales:
     return replace(scales, ripple=math.sqrt(1.0 - SHORT) * scales.ripple)
 
 
-def with_more(one: Hidden, more: float) -> Hidden:
-    """The same with more or less variance beside targets."""
-    if more > 0.0:
-        # at the datum nothing is hidden, whatever the ripple
-        return replace(one, variance=one.variance * (1.0 + more / max(float(one.variance.mean()), 1e-300)))
-    return replace(one, variance=np.maximum(one.variance + more, 0.0))
-
-
 @cache
 def _lost(cells: int) -> Array:
     """(7,) mean variance over the axis that so many cells do not hold of a process of size 1."""

@@ -144,14 +144,17 @@ def _integrated(values: Array) -> Array:
     return np.asarray(top + np.log(np.exp(values - top).sum(axis=0)))
 
 
-def characters(values: Mapping[str, Array]) -> dict[str, Scales]:
-    """The scales of each component, from the log evidence (n,) of all candidates for each. Those of one class
-    differ little, those of others more."""
+def characters(values: Mapping[str, Array]) -> dict[str, Array]:
+    """Probabilities of kinds, sizes, steps and ripple of each component, from the log evidence (n,) of all
+    candidates for each. Those of one class differ little, those of others more."""
     shared = _Shared.of(values)
-    return {
-        name: _expected(_normal(own) * shared.prior(class_of(name), name), class_of(name))
-        for name, own in values.items()
-    }
+    tables = {name: _normal(own) * shared.prior(class_of(name), name) for name, own in values.items()}
+    return {name: table / table.sum() for name, table in tables.items()}
+
+
+def expected(table: Array, kind: str) -> Scales:
+    """The scales to be expected of a curve of a class with such probabilities."""
+    return Scales.of((table.ravel() @ candidates(kind) ** MOMENT) ** (1.0 / MOMENT))
 
 
 def of_others(values: Mapping[str, Array]) -> dict[str, Array]:
@@ -231,8 +234,3 @@ def _blurred(table: Array, differ: Sequence[float]) -> Array:
     for axis, (count, own) in enumerate(zip(_SHAPE, differ, strict=True)):
         table = np.moveaxis(np.tensordot(_kernel(count, own), table, (1, axis)), 0, axis)
     return table
-
-
-def _expected(weight: Array, kind: str) -> Scales:
-    share = weight.ravel() / weight.sum()
-    return Scales.of((share @ candidates(kind) ** MOMENT) ** (1.0 / MOMENT))

@@ -12,7 +12,7 @@ from olp.calibration.estimator.basis import CurveSpace, Scales, Spline, Step, Wa
 from olp.calibration.estimator.between import Hidden, hidden
 from olp.calibration.estimator.character import of_others
 from olp.calibration.estimator.parameters import MeasuringLine, Parameters
-from olp.calibration.estimator.smoothing import AMPLITUDE, Features, Shape, features_of, shapes_of
+from olp.calibration.estimator.smoothing import AMPLITUDE, Features, Hides, Shape, features_of, shapes_of
 from olp.calibration.iso230.separation import aliased
 from olp.calibration.observations.base import Noise, Observation, Scattered
 from olp.calibration.observations.lines import Line, shared_names, targets_of
@@ -43,8 +43,9 @@ SWEEP = 0.3
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
     """What holds throughout an adjustment. `lines` each with its noise, `box_mm` (3, 2) what the readings
-    cover, `others` the character of curves without lines (`character.of_others`). `waves` are the cyclic
-    terms to begin with, `unobservable` says why others are not observable."""
+    cover, `others` the character of curves without lines (`character.of_others`), `hides` what cells hide of
+    a curve with lines. `waves` are the cyclic terms to begin with, `unobservable` says why others are not
+    observable."""
 
     chain: str
     datum_mm: Vector
@@ -53,6 +54,7 @@ class Model:
     splines: Sequence[Spline]
     shapes: Mapping[str, Shape]
     others: Mapping[str, Array]
+    hides: Hides
     waves: Mapping[str, tuple[Wave, ...]]
     unobservable: Mapping[tuple[str, float], str]
     framed: bool
@@ -71,9 +73,9 @@ class Model:
         x, y, z = datum_mm or (float(np.clip(0.0, *side)) for side in box)
         splines = [_spline(own, axis, ranges[axis], cells) for axis in range(3)]
         waves, unobservable = _waves(measurements, own, observations)
-        shapes, others = _shapes(_without_form(lines), splines, waves, (x, y, z), tell)
+        shapes, others, hides = _shapes(_without_form(lines), splines, waves, (x, y, z), tell)
         framed = any(taken.framed for taken in observations)
-        return cls(chain, (x, y, z), box, lines, splines, shapes, others, waves, unobservable, framed)
+        return cls(chain, (x, y, z), box, lines, splines, shapes, others, hides, waves, unobservable, framed)
 
     def parameters(self, waves: Mapping[str, tuple[Wave, ...]]) -> Parameters:
         """The layout of theta with some cyclic terms."""
@@ -192,10 +194,10 @@ def _shapes(
     waves: Mapping[str, tuple[Wave, ...]],
     datum_mm: Vector,
     tell: Progress,
-) -> tuple[dict[str, Shape], dict[str, Array]]:
+) -> tuple[dict[str, Shape], dict[str, Array], Hides]:
     """The shape of every component with lines: the features of each by itself, then again where others have
-    their steps; then the scales of all curves of a class. Also what curves without lines are like,
-    by class."""
+    their steps; then the scales of all curves of a class. Also what curves without lines are like, by class,
+    and what cells hide of those with lines."""
     found: dict[str, Features] = {}
     # angles first: a reflector on the table reads their steps, too
     order = sorted(COMPONENTS, key=lambda name: name[1] in AXES)
@@ -222,7 +224,7 @@ def _shapes(
         amplitude = AMPLITUDE[name[1] in "ABC"]
         return hidden(_own_lines(name, lines), splines[axis], scales, amplitude, datum_mm[axis])
 
-    return shapes_of(found, hides), of_others({name: own.values for name, own in found.items()})
+    return shapes_of(found, hides), of_others({name: own.values for name, own in found.items()}), hides
 
 
 def _on_table(lines: Sequence[tuple[Line, Noise]]) -> bool:

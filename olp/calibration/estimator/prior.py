@@ -82,16 +82,21 @@ class Prior:
             precision[p.slices["frame"], p.slices["frame"]] = np.eye(9) / FRAME_MM**2
         return precision, logdet
 
+    def with_shapes(self, shapes: Mapping[str, Shape]) -> Prior:
+        """The same with other shapes of curves with lines."""
+        return Prior(self.parameters, shapes, self.squares, self.classes, self._blocks)
+
     def _block(self, name: str, one: Class) -> tuple[Array, float]:
         """The precision of a curve and its log determinant. Those without lines are as their class."""
+        space, shape = self.parameters.spaces[name], self.shapes.get(name)
+        if shape is not None:
+            one = AMPLITUDE[name[1] in "ABC"], shape.scales
+        else:
+            # coefficients that move together share one size
+            one = one[0] * np.sqrt(space.size), in_cells(one[1])
         found = self._blocks.get((name, one))
         if found is None:
-            space, shape = self.parameters.spaces[name], self.shapes.get(name)
-            if shape is not None:
-                block = space.process(shape.scales, AMPLITUDE[name[1] in "ABC"])
-            else:
-                # coefficients that move together share one size
-                block = space.process(in_cells(one[1]), one[0] * np.sqrt(space.size))
+            block = space.process(one[1], one[0])
             found = self._blocks[name, one] = block, float(np.linalg.slogdet(block)[1])
         return found
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from olp.calibration.estimator.basis import Feature, Kink, Scales, Spline, Step, Wave
 from olp.calibration.estimator.between import Hidden
-from olp.calibration.estimator.character import Evidence, candidates, characters, fewer
+from olp.calibration.estimator.character import Evidence, candidates, characters, class_of, expected, fewer
 from olp.calibration.estimator.normal import Block, Chunk, Normal
 from olp.calibration.observations.base import Noise
 from olp.calibration.observations.lines import Line, drift_ramps, targets_of
@@ -40,13 +40,16 @@ MOST = 8
 FINEST = 80
 
 Half = Literal["none", "constant", "curve"]
+#: What cells hide of a curve of some scales, by its name.
+Hides = Callable[[str, Scales], Hidden]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """The shape of a curve from its lines: the scales of its processes, features, dependence on direction and
-    its roughness, and what the cells of its spline hide."""
+    """The shape of a curve from its lines: probabilities of its character and the scales to be expected,
+    features, dependence on direction and its roughness, and what the cells of its spline hide."""
 
+    table: Array
     scales: Scales
     features: tuple[Feature, ...]
     half: Half
@@ -113,13 +116,13 @@ def features_of(
     return Features(tuple(tried[i] for i in sorted(chosen)), half, half_roughness, values)
 
 
-def shapes_of(features: Mapping[str, Features], hides: Callable[[str, Scales], Hidden]) -> dict[str, Shape]:
+def shapes_of(features: Mapping[str, Features], hides: Hides) -> dict[str, Shape]:
     """The shapes of all curves with lines, as they are alike; `hides` is what cells hide of each."""
-    found = characters({name: own.values for name, own in features.items()})
-    return {
-        name: Shape(found[name], own.features, own.half, own.half_roughness, hides(name, found[name]))
-        for name, own in features.items()
-    }
+    shapes = {}
+    for name, table in characters({name: own.values for name, own in features.items()}).items():
+        scales, own = expected(table, class_of(name)), features[name]
+        shapes[name] = Shape(table, scales, own.features, own.half, own.half_roughness, hides(name, scales))
+    return shapes
 
 
 def _direction(evidence: Evidence, covariance: Array, half: Spline, angle: bool) -> tuple[Half, float]:

@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from olp.calibration.estimator import lined
 from olp.calibration.estimator.basis import Scales
 from olp.calibration.estimator.beside import block_of, shares_of
-from olp.calibration.estimator.between import SHORT, Hidden, with_more
+from olp.calibration.estimator.between import Hidden
 from olp.calibration.estimator.character import (
     RIPPLE,
     SIZES,
@@ -27,6 +28,7 @@ from olp.calibration.estimator.character import (
     class_of,
     rms_of_processes,
 )
+from olp.calibration.estimator.lined import Levels, Lined, level_of
 from olp.calibration.estimator.normal import Block, Chunk, Normal, evidence
 from olp.calibration.estimator.prior import Class, Prior
 from olp.calibration.estimator.smoothing import Shape
@@ -78,24 +80,22 @@ class _Character:
 @dataclass(slots=True)
 class Unread:
     """Curves without lines. `before` holds the probabilities of their characters by class, as the curves with
-    lines show them, if `lined`."""
+    lines show them, if there are such; `lined` are these."""
 
     before: Mapping[str, Array]
-    lined: bool
+    lined: Lined
     own: dict[str, _Character] = field(init=False)
-    first: dict[str, _Character] = field(init=False)
     sized: bool = field(init=False)
     heard: bool = field(init=False)
 
     def __post_init__(self) -> None:
         self.own = {kind: _Character(*_expectations(table)) for kind, table in self.before.items()}
-        self.sized, self.heard = self.lined, False
-        if not self.lined:
+        self.sized, self.heard = bool(self.lined.first), False
+        if not self.sized:
             middle, spread = SIZE_BEFORE
             self.own = {
                 kind: replace(one, size=middle * math.exp(spread**2)) for kind, one in self.own.items()
             }
-        self.first = dict(self.own)
 
     @property
     def classes(self) -> dict[str, Class]:
@@ -103,10 +103,10 @@ class Unread:
 
     def learn(self, prior: Prior, states: Sequence[State], theta: Array) -> bool:
         """Adds what readings beside lines say of the classes; False where there are no such readings."""
-        readings = _Readings.of(prior, self.own, states, theta)
+        readings = _Readings.of(prior, states, theta)
         if readings is None:
             return False
-        normal = readings.normal(self.own)
+        normal = readings.normal(self.own, self.lined.shapes())
         p = prior.parameters
         kinds = [
             kind for kind in self.own
@@ -119,29 +119,14 @@ class Unread:
             return False
         if not self.sized:
             self._find(readings, kinds)
-        self._learn_ripple(readings, math.inf if kinds else IMPROBABLE)
-        if kinds:
-            self._sweep(readings, kinds)
-            self._learn_steps(readings, kinds)
+        bound = math.inf if kinds else IMPROBABLE
+        self._learn_ripple(readings, bound)
+        self._learn_kinds(readings, kinds, bound)
+        for kind in kinds:
+            self._learn_size(readings, kind)
+        self._learn_steps(readings, kinds, bound)
         self.sized = self.heard = True
         return True
-
-    def shapes(self, shapes: Mapping[str, Shape]) -> Mapping[str, Shape]:
-        """Those of curves with lines, with the ripple that readings beside these lines show."""
-        if not self.heard:
-            return shapes
-        changed = {}
-        for name, shape in shapes.items():
-            times = self.own[class_of(name)].ripple / self.first[class_of(name)].ripple
-            hidden = with_more(shape.hidden, _more(shape.scales, times))
-            scales = replace(shape.scales, ripple=times * shape.scales.ripple)
-            changed[name] = replace(shape, scales=scales, hidden=hidden)
-        return changed
-
-    def _score(self, readings: _Readings) -> Callable[[Mapping[str, _Character]], float]:
-        """The log evidence where some classes are changed, with noise as it is now."""
-        normal = readings.normal(self.own)
-        return lambda changed: evidence(normal, *readings.prior.precision(_classes({**self.own, **changed})))
 
     def _find(self, readings: _Readings, kinds: Sequence[str]) -> None:
         """Where to begin, all classes alike: the most probable of few candidates of everything together. What
@@ -158,72 +143,83 @@ class Unread:
                 kind: replace(one, steps=float(STEPS[j]), ripple=float(RIPPLE[k]))
                 for kind, one in self.own.items()
             }
-            normal = readings.normal(rough)
+            score = readings.score(rough, self.lined.shapes())
             for i, size in itertools.product(FEW[0], SIZES[list(FEW[1])]):
                 smooth = tuple(pure[i].tolist())
                 own = {**rough, **{kind: replace(rough[kind], kinds=smooth, size=size) for kind in kinds}}
-                value = evidence(normal, *readings.prior.precision(_classes(own)))
+                value = score(own)
                 value += marginals[0][i] + marginals[1][j] + marginals[2][k] + _about(size, *SIZE_BEFORE)
                 if value > most:
                     best, most = own, value
         self.own = best
 
-    def _sweep(self, readings: _Readings, kinds: Sequence[str]) -> None:
-        score = self._score(readings)
-        self._learn_kinds(kinds, score)
-        for kind in kinds:
-            self._learn_size(kind, score)
-
     def _learn_ripple(self, readings: _Readings, bound: float) -> None:
         """Ripple of all curves, also of those with lines, by one factor. Cells hide most of it: that is
         noise of readings."""
         now = {kind: max(one.ripple, LEAST_RIPPLE) for kind, one in self.own.items()}
-        tried = [{kind: times * size for kind, size in now.items()} for times in TIMES]
-        marginals = [(_log(self.before[kind].sum(axis=(0, 1, 2))), size) for kind, size in now.items()]
-        grid = np.log(RIPPLE[1:])
-        values = [np.mean([own[0] for own, _ in marginals])]
-        for times in TIMES[1:]:
-            values.append(
-                np.mean(
-                    [np.interp(np.log(times * size), grid, own[1:], right=NONE) for own, size in marginals]
-                )
-            )
-        probable = np.array(values) > max(values) - bound
-        if probable.sum() < 2:
-            return
-        for k in np.flatnonzero(probable).tolist():
-            values[k] += readings.evidence(
-                {kind: replace(self.own[kind], ripple=size) for kind, size in tried[k].items()}
-            )
-        times = _expected(np.array(TIMES)[probable], np.array(values)[probable])
+        sizes = {kind: np.multiply(TIMES, size) for kind, size in now.items()}
+        values = np.mean(
+            [_prior_of(self.before[kind], lined.RIPPLE, RIPPLE, sizes[kind]) for kind in now], axis=0
+        )
+
+        def changed(k: int) -> dict[str, _Character]:
+            return {kind: replace(one, ripple=float(sizes[kind][k])) for kind, one in self.own.items()}
+
+        levels = {kind: np.array([level_of(RIPPLE, size) for size in sizes[kind]]) for kind in now}
+        share = self._shares(readings, lined.RIPPLE, levels, values, changed, bound)
+        times = float(np.sqrt(share @ np.square(TIMES)))
         self.own = {kind: replace(one, ripple=times * now[kind]) for kind, one in self.own.items()}
 
-    def _learn_steps(self, readings: _Readings, kinds: Sequence[str]) -> None:
-        """Steps of curves without lines, alike in all classes. Cells hide some of them, too."""
+    def _learn_steps(self, readings: _Readings, kinds: Sequence[str], bound: float) -> None:
+        """Steps of all curves, alike in all classes. Cells hide some of them, too."""
+        kinds = kinds or list(self.own)
         values = _log(np.mean([self.before[kind].sum(axis=(0, 1, 3)) for kind in kinds], axis=0))
-        near = np.ones(len(STEPS), bool)
-        if self.heard or self.own[kinds[0]].steps in STEPS:
+        if self.heard or (not self.lined.first and self.own[kinds[0]].steps in STEPS):
             near = np.abs(np.arange(len(STEPS)) - np.argmin(np.abs(STEPS - self.own[kinds[0]].steps)))
-            near = near <= (1 if self.heard else 2)
-        for k in np.flatnonzero(near).tolist():
-            changed = {kind: replace(self.own[kind], steps=STEPS[k]) for kind in kinds}
-            values[k] += readings.evidence({**self.own, **changed})
-        size = _expected(STEPS[near], values[near])
+            values[near > (1 if self.heard else 2)] = NONE
+
+        def changed(k: int) -> dict[str, _Character]:
+            return {**self.own, **{kind: replace(self.own[kind], steps=float(STEPS[k])) for kind in kinds}}
+
+        levels = dict.fromkeys(self.own, np.arange(len(STEPS), dtype=float))
+        share = self._shares(readings, lined.STEPS, levels, values, changed, bound)
+        size = float(np.sqrt(share @ STEPS**2))
         self.own.update({kind: replace(self.own[kind], steps=size) for kind in kinds})
 
-    def _learn_kinds(self, kinds: Sequence[str], score: Callable[[Mapping[str, _Character]], float]) -> None:
+    def _learn_kinds(self, readings: _Readings, kinds: Sequence[str], bound: float) -> None:
         """The kind of the smooth part is that of the machine."""
-        marginal = _log(np.mean([self.before[kind].sum(axis=(1, 2, 3)) for kind in kinds], axis=0))
+        kinds = kinds or list(self.own)
+        values = _log(np.mean([self.before[kind].sum(axis=(1, 2, 3)) for kind in kinds], axis=0))
         pure = [tuple(row) for row in np.eye(len(SMOOTH)).tolist()]
-        values = [score({kind: replace(self.own[kind], kinds=row) for kind in kinds}) for row in pure]
-        shares = tuple(_weights(values + marginal).tolist())
-        self.own.update({kind: replace(self.own[kind], kinds=shares) for kind in kinds})
 
-    def _learn_size(self, kind: str, score: Callable[[Mapping[str, _Character]], float]) -> None:
+        def changed(k: int) -> dict[str, _Character]:
+            return {**self.own, **{kind: replace(self.own[kind], kinds=pure[k]) for kind in kinds}}
+
+        levels = dict.fromkeys(self.own, np.arange(len(SMOOTH), dtype=float))
+        share = self._shares(readings, lined.KIND, levels, values, changed, bound)
+        self.own.update({kind: replace(self.own[kind], kinds=tuple(share.tolist())) for kind in kinds})
+
+    def _shares(
+        self, readings: _Readings, axis: int, levels: Levels, values: Array,
+        changed: Callable[[int], Mapping[str, _Character]], bound: float,
+    ) -> Array:  # fmt: skip
+        """(n,) probabilities of levels of an axis, with logarithms `values` (n,) before readings; those less
+        probable by `bound` are not tried. Curves with lines hear of them."""
+        values, probable = values.copy(), values > max(values.max() - bound, 0.5 * NONE)
+        if probable.sum() > 1:
+            for k in np.flatnonzero(probable).tolist():
+                values[k] += readings.evidence(changed(k), self.lined.at(axis, levels, k))
+        share = np.zeros(len(values))
+        share[probable] = _weights(values[probable])
+        self.lined.hear(axis, levels, share)
+        return share
+
+    def _learn_size(self, readings: _Readings, kind: str) -> None:
         own = self.own[kind]
         near = np.abs(np.log2(SIZES / own.size)) <= _NEAR + 0.5
-        values = np.array([score({kind: replace(own, size=size)}) for size in SIZES[near]])
-        if self.lined:
+        score = readings.score(self.own, self.lined.shapes())
+        values = np.array([score({**self.own, kind: replace(own, size=size)}) for size in SIZES[near]])
+        if self.lined.first:
             values += _log(self.before[kind].sum(axis=(0, 2, 3)))[near]
         else:
             others = [math.log(one.size) for other, one in self.own.items() if other != kind]
@@ -238,7 +234,6 @@ class _Readings:
     (n, curves) is the variance that curves hide at them, `each` the same where all hide a variance of 1."""
 
     prior: Prior
-    own: Mapping[str, _Character]
     lines: Normal
     chunk: Chunk
     precision: Array
@@ -246,9 +241,7 @@ class _Readings:
     each: Array
 
     @classmethod
-    def of(
-        cls, prior: Prior, own: Mapping[str, _Character], states: Sequence[State], theta: Array
-    ) -> _Readings | None:
+    def of(cls, prior: Prior, states: Sequence[State], theta: Array) -> _Readings | None:
         """None where no readings are scattered."""
         p, hidden = prior.parameters, prior.hidden
         unit = dict.fromkeys(hidden, Hidden(np.zeros(1), np.ones(1)))
@@ -267,32 +260,41 @@ class _Readings:
         each = [shares_of(state, theta, p, unit)[1] for state in thin]
         chunk = _joined([_joined(list(block.chunks())) for block in blocks], apart=True)
         precision = np.concatenate([block.precision for block in blocks])
-        return cls(prior, dict(own), lines, chunk, precision, np.concatenate(now), np.concatenate(each))
+        return cls(prior, lines, chunk, precision, np.concatenate(now), np.concatenate(each))
 
-    def normal(self, own: Mapping[str, _Character]) -> Normal:
-        """All of them, with noise as curves of such characters make it."""
+    def normal(self, own: Mapping[str, _Character], shapes: Mapping[str, Shape]) -> Normal:
+        """All of them, with noise as curves of such characters and shapes make it."""
         variance = np.zeros(len(self.chunk.y))
         for k, (name, one) in enumerate(self.prior.hidden_of(_classes(own)).items()):
-            shape = self.prior.shapes.get(name)
+            shape = shapes.get(name)
             if shape is None:
                 variance = variance + self.each[:, k] * one.variance[0]
             else:
-                times = own[class_of(name)].ripple / self.own[class_of(name)].ripple
-                more = self.each[:, k] * _more(shape.scales, times)
-                variance = variance + np.maximum(self.now[:, k] + more, 0.0)
+                times = shape.hidden.variance.mean() / max(float(one.variance.mean()), 1e-300)
+                variance = variance + times * self.now[:, k]
         normal = replace(self.lines, H=self.lines.H.copy(), g=self.lines.g.copy())
         chunk = replace(self.chunk, beside=np.sqrt(variance))
         normal.add(Block.of(chunk, np.arange(len(normal.g)), self.precision))
         return normal
 
-    def evidence(self, own: Mapping[str, _Character]) -> float:
-        """The log evidence of all of them under curves of such characters, up to a constant."""
-        return evidence(self.normal(own), *self.prior.precision(_classes(own)))
+    def evidence(self, own: Mapping[str, _Character], shapes: Mapping[str, Shape]) -> float:
+        """The log evidence of readings beside lines under curves of such characters and shapes, up to a
+        constant."""
+        return self.score(own, shapes)(own)
 
+    def score(
+        self, own: Mapping[str, _Character], shapes: Mapping[str, Shape]
+    ) -> Callable[[Mapping[str, _Character]], float]:
+        """The same of other characters, with noise as these make it."""
+        normal, prior = self.normal(own, shapes), self.prior.with_shapes(shapes)
 
-def _more(scales: Scales, times: float) -> float:
-    """By how much more variance cells hide of a curve of such scales with so many times its ripple."""
-    return float(SHORT * (times**2 - 1.0) * (scales.ripple * rms_of_processes()[3]) ** 2)
+        def value(changed: Mapping[str, _Character]) -> float:
+            precision = prior.precision(_classes(changed))
+            whole = evidence(normal, *precision)
+            # what lines say is in the probabilities before
+            return whole - evidence(self.lines, *precision) if shapes else whole
+
+        return value
 
 
 def _classes(own: Mapping[str, _Character]) -> dict[str, Class]:
@@ -345,6 +347,14 @@ def _expectations(table: Array) -> tuple[tuple[float, ...], float, float, float]
     grids = (SIZES, (0, 2, 3)), (STEPS, (0, 1, 3)), (RIPPLE, (0, 1, 2))
     size, steps, ripple = (float(np.sqrt(table.sum(axis=axes) @ grid**2)) for grid, axes in grids)
     return tuple(kinds.tolist()), size, steps, ripple
+
+
+def _prior_of(table: Array, axis: int, grid: Array, sizes: Array) -> Array:
+    """(n,) log probabilities of sizes (n,) along an axis of a table; the first candidate is zero."""
+    own = _log(table.sum(axis=tuple(other for other in range(4) if other != axis)))
+    positive = np.maximum(sizes, 1e-300)
+    values = np.interp(np.log(positive), np.log(grid[1:]), own[1:], right=NONE)
+    return np.asarray(np.where(sizes == 0.0, own[0], values))
 
 
 def _weights(values: Array) -> Array:

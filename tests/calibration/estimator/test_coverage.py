@@ -9,7 +9,8 @@ from cases.fast import some_fast, some_of_a_campaign
 from judge import families
 
 from olp.calibration.estimator.basis import RIPPLE, CurveSpace, Scales, Spline
-from olp.calibration.estimator.character import Evidence, candidates, characters
+from olp.calibration.estimator.character import Evidence, candidates, class_of, expected
+from olp.calibration.estimator.character import characters as tables_of
 from olp.calibration.estimator.normal import Normal
 
 SPLINE = Spline(0.0, 900.0, 24)
@@ -95,6 +96,10 @@ def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
     gain = evidence.gains(scales[:1], [], [0])[0]
     pair = [evidence.values(evidence.covariance(scales[:1], chosen))[0] for chosen in ([0], [])]
     assert gain == pytest.approx(pair[0] - pair[1], abs=1e-8)
+
+
+def characters(values: dict[str, np.ndarray]) -> dict[str, Scales]:
+    return {name: expected(table, class_of(name)) for name, table in tables_of(values).items()}
 
 
 #: All angles.

@@ -12,7 +12,7 @@ from judge import families, simulated
 
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.basis import RIPPLE, Scales, Spline
-from olp.calibration.estimator.between import Hidden, beside_cells, in_cells, with_more
+from olp.calibration.estimator.between import beside_cells, in_cells
 from olp.calibration.estimator.character import USUAL, candidates, of_others, rms_of_processes
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.normal import Block, Chunk, Normal, evidence
@@ -79,12 +79,6 @@ def test_what_cells_hide_of_steps_is_what_no_spline_of_theirs_fits() -> None:
     ripple = Scales(0.0, 0.0, 0.0, 1.0 / float(rms_of_processes()[RIPPLE]))
     kept = (in_cells(ripple).ripple / ripple.ripple) ** 2
     assert beside_cells(spline, ripple).variance[0] + kept == pytest.approx(1.0, rel=0.05)
-
-
-def test_more_ripple_hides_nothing_at_the_datum_and_less_never_below_zero() -> None:
-    hidden = Hidden(np.array([0.0, 10.0, 20.0]), np.array([0.0, 2.0, 4.0]))
-    assert with_more(hidden, 2.0).variance == pytest.approx([0.0, 4.0, 8.0])
-    assert with_more(hidden, -3.0).variance == pytest.approx([0.0, 0.0, 1.0])
 
 
 def test_readings_at_one_position_do_not_average_what_is_hidden_there() -> None:
