@@ -141,10 +141,54 @@ def _worn(
     return curve
 
 
+#: How much smaller the errors of a very good machine are, and how much larger those of a bad one.
+OTHER_SIZE = 5.0
+
+
+def _harmonic(
+    rng: np.random.Generator, low: float, span: float, size: float, own: bool, joints: np.ndarray
+) -> Curve:
+    """Waves of a rack (20 to 120 mm) and of a long gear (120 to 500 mm), each with two harmonics."""
+    base = _waves(rng, low, span, 0.6 * size, own)
+    parts = [
+        (2 * np.pi * k / period, height / k, rng.uniform(0.0, 2 * np.pi))
+        for period, height in zip(
+            np.exp(rng.uniform(np.log((20.0, 120.0)), np.log((120.0, 500.0)))),
+            rng.uniform(0.05, 0.12, 2) * size,
+            strict=True,
+        )
+        for k in (1, 2, 3)
+    ]
+
+    def curve(q: np.ndarray) -> np.ndarray:
+        q = np.asarray(q, float)
+        return base(q) + sum(a * np.sin(w * q + phase) for w, a, phase in parts)
+
+    return curve
+
+
+def _good(
+    rng: np.random.Generator, low: float, span: float, size: float, own: bool, joints: np.ndarray
+) -> Curve:
+    """Screws of a very good machine."""
+    return _screws(rng, low, span, size / OTHER_SIZE, own, joints)
+
+
+def _bad(
+    rng: np.random.Generator, low: float, span: float, size: float, own: bool, joints: np.ndarray
+) -> Curve:
+    """Joints of a bad machine."""
+    return _jointed(rng, low, span, size * OTHER_SIZE, own, joints)
+
+
 #: Families on which nothing was tuned.
-UNTUNED: dict[str, Draw] = {"bows": _bowed, "rails": _railed, "racks": _racked, "wear": _worn}
+UNTUNED: dict[str, Draw] = {
+    "bows": _bowed, "rails": _railed, "racks": _racked, "wear": _worn, "harmonics": _harmonic,
+}  # fmt: skip
+#: Families of other size: how steps and ripple go with the size of a machine was looked at on these.
+SIZED: dict[str, Draw] = {"good": _good, "bad": _bad}
 #: All of them.
-DRAWS = FAMILIES | UNTUNED
+DRAWS = FAMILIES | UNTUNED | SIZED
 
 
 def class_of(name: str) -> str:

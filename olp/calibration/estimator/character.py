@@ -28,9 +28,9 @@ SMOOTH_BEFORE = 0.3, 0.5, 1.0, 3.0, 3.0
 #: Candidates for the smooth part of positioning, root mean square over the axis in mm, as all candidates.
 SIZES = np.geomspace(2e-3, 0.512, 9)
 #: Candidates for steps.
-STEPS = np.concatenate([[0.0], np.geomspace(4e-4, 0.0256, 6)])
+STEPS = np.concatenate([[0.0], np.geomspace(4e-4, 0.1024, 8)])
 #: Candidates for ripple.
-RIPPLE = np.concatenate([[0.0], np.geomspace(4e-4, 6.4e-3, 5)])
+RIPPLE = np.concatenate([[0.0], np.geomspace(4e-4, 0.0256, 7)])
 #: How large the curves of a class usually are against positioning, in mm or rad.
 USUAL = {"positioning": 1.0, "straightness": 0.4, "angle": 0.6e-3}
 #: How far curves of one class differ, as a standard deviation in candidates: kind of the smooth part, its
@@ -39,11 +39,16 @@ USUAL = {"positioning": 1.0, "straightness": 0.4, "angle": 0.6e-3}
 ALIKE = 0.0, 1.0, 0.5, 0.25
 #: The same of classes, beside what they usually are.
 RELATED = 0.0, 1.0, 0.5, 0.5
-#: Before any reading: the probability of no steps, what they are else (mm), and the standard deviation of the
-#: logarithm of that.
-STEPS_BEFORE = 0.9, 1.2e-3, 0.7
+#: Before any reading: the probability of no steps, what they are else beside a usual smooth part, mm, and the
+#: standard deviation of the logarithm of that.
+STEPS_BEFORE = 0.9, 1.05e-3, 0.7
 #: The same of ripple.
 RIPPLE_BEFORE = 0.15, 3.0e-3, 0.3
+#: A usual smooth part of positioning, mm.
+USUAL_SIZE = 0.01
+#: Steps and ripple go with this power of the smooth part: a machine five times better has less of both, but
+#: screws and racks do not know how straight their guides are.
+GOES_WITH = 0.5
 #: The scale that stands for all probable ones is the mean of this power of them: 2 is the expected variance.
 MOMENT = 2.0
 #: Directions of the unknowns that readings determine less than this, against the best, say nothing.
@@ -200,13 +205,16 @@ def _before() -> Array:
     """Log probabilities of candidates before any reading, for all sizes of smooth parts alike."""
     smooth = np.log(SMOOTH_BEFORE)[:, None, None, None]
     steps, ripple = _log_normal(STEPS, *STEPS_BEFORE), _log_normal(RIPPLE, *RIPPLE_BEFORE)
-    return np.asarray(smooth + steps[:, None] + ripple + np.zeros(_SHAPE))
+    return np.asarray(smooth + steps[:, :, None] + ripple[:, None, :] + np.zeros(_SHAPE))
 
 
 def _log_normal(grid: Array, none: float, middle: float, spread: float) -> Array:
-    """Log probabilities of candidates, the first of which is zero."""
-    density = np.exp(-0.5 * (np.log(grid[1:] / middle) / spread) ** 2)
-    return np.asarray(np.log(np.append(none, (1.0 - none) * density / density.sum())))
+    """(sizes, n) log probabilities of candidates, the first of which is zero, beside each smooth part."""
+    middles = middle * (SIZES[:, None] / USUAL_SIZE) ** GOES_WITH
+    density = -0.5 * (np.log(grid[1:] / middles) / spread) ** 2
+    density = np.exp(density - density.max(axis=1, keepdims=True))
+    density *= (1.0 - none) / density.sum(axis=1, keepdims=True)
+    return np.asarray(np.log(np.insert(density, 0, none, axis=1)))
 
 
 def _logarithm(table: Array) -> Array:

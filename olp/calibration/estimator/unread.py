@@ -33,6 +33,7 @@ from olp.calibration.estimator.normal import Block, Chunk, Normal, evidence
 from olp.calibration.estimator.prior import Class, Prior
 from olp.calibration.estimator.smoothing import Shape
 from olp.calibration.observations.base import ScatteredState, State
+from olp.calibration.observations.radial import AlongState
 from olp.core.arrays import Array
 from olp.core.values import dataclass
 
@@ -245,13 +246,12 @@ class _Readings:
         """None where no readings are scattered."""
         p, hidden = prior.parameters, prior.hidden
         unit = dict.fromkeys(hidden, Hidden(np.zeros(1), np.ones(1)))
-        # readings along lines and circles are repeated, or near each other: they see no independent ripple
-        wide = [state for state in states if isinstance(state, ScatteredState)]
+        wide = [state for state in states if isinstance(state, ScatteredState | AlongState) and state.apart]
         if not wide:
             return None
         lines = Normal.of(p.size)
         for state in states:
-            if not isinstance(state, ScatteredState):
+            if state not in wide:
                 lines.add(block_of(state, theta, p, hidden))
         prior.push(lines)
         every = math.ceil(sum(_rows(state) for state in wide) / ENOUGH)
@@ -301,13 +301,15 @@ def _classes(own: Mapping[str, _Character]) -> dict[str, Class]:
     return {kind: one.of(kind) for kind, one in own.items()}
 
 
-def _rows(state: ScatteredState) -> int:
+def _rows(state: ScatteredState | AlongState) -> int:
+    if isinstance(state, AlongState):
+        return state.count
     return len(state.spread_over_rows(np.ones(state.count, np.int64)))
 
 
-def _thinned(state: ScatteredState, every: int) -> ScatteredState:
-    """A state with every so many of its readings."""
-    if every == 1:
+def _thinned(state: ScatteredState | AlongState, every: int) -> ScatteredState | AlongState:
+    """A state with every so many of its readings. Those along one direction are few."""
+    if every == 1 or isinstance(state, AlongState):
         return state
     whole: Any = state
     taken: Any = state.observation

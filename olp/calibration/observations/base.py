@@ -125,12 +125,14 @@ class State(ABC):
     """An observation within an adjustment. A frozen value; each step of the adjustment makes a new one.
 
     `noun` names several of them in a sentence, "" where no sentence counts them. `tally` is the sum of the
-    report that it counts in; `section` is the table of the report that holds its `row`, "" for none.
+    report that it counts in; `section` is the table of the report that holds its `row`, "" for none. Readings
+    are `apart` where their positions are no neighbours: a short wave at one says nothing of the next.
     """
 
     __slots__ = ()
     noun: ClassVar[str] = ""
     tally: ClassVar[str] = "readings"
+    apart: ClassVar[bool] = False
     observation: Observation
 
     @property
@@ -235,6 +237,7 @@ class ScatteredState(State):
     """Scattered readings within an adjustment."""
 
     __slots__ = ()
+    apart = True
     observation: Scattered
 
     @property

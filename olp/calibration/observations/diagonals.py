@@ -133,6 +133,7 @@ class Diagonal(Observation):
 class DiagonalState(AlongState):
     """A diagonal in an adjustment, with the noise of its readings. One row per reading."""
 
+    apart = True
     observation: Diagonal
     noise: Noise
 

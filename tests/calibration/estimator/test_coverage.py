@@ -9,7 +9,15 @@ from cases.fast import some_fast, some_of_a_campaign
 from judge import families
 
 from olp.calibration.estimator.basis import RIPPLE, CurveSpace, Scales, Spline
-from olp.calibration.estimator.character import Evidence, candidates, class_of, expected
+from olp.calibration.estimator.character import (
+    SIZES,
+    USUAL,
+    Evidence,
+    candidates,
+    class_of,
+    expected,
+    rms_of_processes,
+)
 from olp.calibration.estimator.character import characters as tables_of
 from olp.calibration.estimator.normal import Normal
 
@@ -100,6 +108,20 @@ def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
 
 def characters(values: dict[str, np.ndarray]) -> dict[str, Scales]:
     return {name: expected(table, class_of(name)) for name, table in tables_of(values).items()}
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_steps_and_ripple_before_any_reading_go_with_the_size_of_a_machine(size: int) -> None:
+    """Lines show the size of the smooth part and nothing else: 16 times as large, 4 times the ripple."""
+    table = candidates("angle")
+    smooth = (table[:, [0, 1, 4, 5, 6]] * rms_of_processes()[[0, 1, 4, 5, 6]]).sum(axis=1)
+    both = []
+    for one in (SIZES[size], 4.0 * SIZES[size], 16.0 * SIZES[size]):
+        shown = np.where(np.isclose(smooth, one * USUAL["angle"]), 0.0, -1e3)
+        both.append(characters(dict.fromkeys(ANGLES, shown))["ECX"].values[2:4])
+    both = np.array(both)
+    assert np.all(np.diff(both, axis=0) > 0.0)
+    assert both[2, 1] / both[0, 1] == pytest.approx(4.0, rel=0.35)
 
 
 #: All angles.
