@@ -55,13 +55,15 @@ def test_levels_that_were_heard_are_mixed_and_those_heard_last_hold() -> None:
     assert shape.scales.slow > 0.0 == shape.scales.middle == shape.scales.bows
 
 
-def test_what_lines_exclude_stays_excluded() -> None:
-    """Lines show large steps beyond doubt: other curves without steps do not change that."""
-    table = FLAT * (np.arange(len(STEPS)) == 4)[:, None]
-    own = curves(table)
-    steps = own.shapes()["ECX"].scales.steps
-    own.hear(lined.STEPS, {"angle": np.zeros(1)}, np.ones(1))
-    assert own.shapes()["ECX"].scales.steps == pytest.approx(steps)
+@pytest.mark.parametrize(("axis", "row"), [(lined.KIND, 5), (lined.STEPS, 2)])
+def test_what_lines_exclude_stays_excluded(axis: int, row: int) -> None:
+    """Lines show one kind, or large steps, beyond doubt: what is heard of other curves does not change it."""
+    shown = np.moveaxis(np.zeros_like(FLAT), axis, 0)
+    shown[3] = 1.0
+    own = curves(np.moveaxis(shown, 0, axis))
+    size = own.shapes()["ECX"].scales.values[row]
+    own.hear(axis, {"angle": np.zeros(1)}, np.ones(1))
+    assert own.shapes()["ECX"].scales.values[row] == pytest.approx(size) != 0.0
 
 
 def hidden_and_steps(fitted: Fit) -> np.ndarray:
