@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 import bench_two_pods as bench
-from cases.calibration import case, cloud, two_pods
+from cases.calibration import case, cloud, measurements_of, two_pods
 from judge import simulated
 
 import olp
@@ -147,6 +147,16 @@ def test_what_an_adjustment_states_is_what_it_is_off() -> None:
     points = cloud(SHOP, 5, 120, 0.01)
     off, _ = judged(points, fitted.error)
     assert 0.4 < off / stated(points, fitted) < 2.0
+
+
+@pytest.mark.slow
+def test_what_an_adjustment_states_holds_between_few_targets() -> None:
+    """On rough machines much of the error lies between the targets, where the covariance alone is silent."""
+    machine = simulated.machine(3, "rough", "FXYZ")
+    taken = simulated.all_lines(machine, 3, runs=3, count=(13, 9, 7))
+    fitted = fit(measurements_of(taken), "FXYZ")
+    points = cloud(machine, 5, 120, 0.01)
+    assert judged(points, fitted.error)[0] / stated(points, fitted) < 1.1
 
 
 def test_of_equal_methods_the_quick_one_is_used() -> None:

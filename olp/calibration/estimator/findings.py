@@ -191,6 +191,9 @@ def _correlation_findings(fit: Fit) -> Iterator[Finding]:
             ends = fit.curve(name, fit.box_mm[AXES.index(name[2])])
             functionals[name] = ends[1] - ends[0]
     names = [name for name in functionals if name not in hidden]
+    if not names:
+        # readings that cannot be those of one machine determine nothing; the misfit says so
+        return
     rows = np.stack([functionals[name] for name in names])
     joint = rows @ fit.covariance @ rows.T
     size = np.sqrt(np.maximum(np.diag(joint), 1e-300))

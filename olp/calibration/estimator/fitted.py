@@ -94,9 +94,14 @@ class Fit:
         position, tool = np.atleast_2d(np.asarray(axis_mm, float)), np.asarray(tool_mm, float)
         rows = self.design(position, tool)
         variance = np.einsum("nik,kl,nil->ni", rows, self.covariance, rows, optimize=True)
+        return np.asarray(np.sqrt(np.maximum(variance + self.hidden(position, tool), 0.0)))
+
+    def hidden(self, axis_mm: Array, tool_mm: Array) -> Array:
+        """(n, 3) variance of `error` in mm^2 that the covariance does not hold: what lies between targets."""
+        variance = np.zeros(axis_mm.shape)
         for name in self.parameters.spaces:
             axis = AXES.index(name[2])
-            between = self.between_targets(name, position[:, axis])
+            between = self.between_targets(name, axis_mm[:, axis])
             if not between.any():
                 continue
             if name[1] in AXES:
@@ -104,8 +109,8 @@ class Fit:
                 continue
             for i, a, k, _ in CROSS:
                 if "ABC"[a] == name[1]:
-                    variance[:, i] += between * self.parameters.lever_arm(i, axis, k, position, tool) ** 2
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+                    variance[:, i] += between * self.parameters.lever_arm(i, axis, k, axis_mm, tool_mm) ** 2
+        return variance
 
     def between_targets(self, name: str, q: Array) -> Array:
         """(n,) variance of a component at q (n,) that its unknowns do not hold: what the cells of its spline

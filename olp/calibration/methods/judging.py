@@ -60,13 +60,15 @@ def beyond_noise(residual_mm: float, points: Points) -> float:
 
 
 def stated(points: Points, fit: Fit) -> float:
-    """rms length (mm) that the covariance of a fit expects at the points, in the best-fit frame."""
+    """rms length (mm) that a fit expects at the points, in the best-fit frame: its covariance, and what its
+    curves do not show between targets."""
     rows = np.unique(np.linspace(0, len(points.axis_mm) - 1, _MOST).astype(int))
     part = Points(points.axis_mm[rows], points.tool_mm[rows], points.measured_mm[rows], points.sigma)
     design = fit.design(part.axis_mm, part.tool_mm)
     framed = _unframed(part, design.reshape(-1, design.shape[2]))
     variance = np.einsum("nk,kl,nl->n", framed, fit.covariance, framed, optimize=True)
-    return float(np.sqrt(max(variance.sum(), 0.0) / len(rows)))
+    between = fit.hidden(part.axis_mm, part.tool_mm)
+    return float(np.sqrt(max(variance.sum() + between.sum(), 0.0) / len(rows)))
 
 
 def best(methods: Sequence[Judged]) -> Judged:
