@@ -20,6 +20,7 @@ from olp.calibration.estimator.nonrigid import NonRigid, nonrigid
 from olp.calibration.estimator.residual_map import map_findings, map_summary, residual_map
 from olp.calibration.estimator.summary import summary
 from olp.calibration.observations.base import ScatteredState, State
+from olp.calibration.observations.copies import repeated_findings
 from olp.calibration.observations.measurements import MapWish, Measurements
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup, Vector
@@ -134,6 +135,7 @@ def fit_calibration(
     findings = (
         *findings_of(fitted, tool_vectors, travel), *targets_apart(fitted),
         *agreement_findings(found, fitted, tool_vectors),
+        *repeated_findings(measurements.observations),
         *([Finding("OLP862", f"not read: {', '.join(left)}")] if left else []),
     )  # fmt: skip
     _refuse_absurd(fitted, findings)
@@ -159,6 +161,9 @@ def _refuse_absurd(fitted: Fit, findings: Sequence[Finding]) -> None:
     if not (total.failed and total.reduced > ABSURD):
         return
     causes = tuple(f"{finding.code}: {finding.message}" for finding in findings if finding.code in _CAUSES)
+    if not causes:
+        evident = ((r.state.label, r.state.observation.evident_mistake()) for r in fitted.results)
+        causes = tuple(f"{label}: {words}" for label, words in evident if words)
     worst = max(fitted.quality.sources, key=lambda one: one.reduced, default=total)
     raise ConfigError(
         f"these readings are not those of one machine: reduced chi-square is {total.reduced:.3g}, "

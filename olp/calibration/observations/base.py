@@ -92,9 +92,11 @@ class Alternative:
 
 class Observation(ABC):
     """Readings of one instrument in one set-up. A frozen value with the file that it came from, and the tool
-    vectors (3,) or (n, 3) in mm that it was read with."""
+    vectors (3,) or (n, 3) in mm that it was read with. `read_columns` names its fields of places and of
+    readings, each with n rows, the readings last."""
 
     __slots__ = ()
+    read_columns: ClassVar[tuple[str, ...]] = ()
     source: str
     tool_mm: Vector | Array
 
@@ -110,6 +112,10 @@ class Observation(ABC):
     def alternatives(self) -> Sequence[Alternative]:
         """What may be wrong with it, each put right."""
         return ()
+
+    def evident_mistake(self) -> str:
+        """What explains readings that are far from those of any machine; "" where that is not known."""
+        return ""
 
     @abstractmethod
     def reach(self, axis: int) -> Array:

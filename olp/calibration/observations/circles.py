@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -43,6 +44,8 @@ class Circles(Observation):
     the tool vector; `feed_mm_s` along the circle, 0 where not known; `sigma` of one reading in mm. Raises
     ConfigError.
     """
+
+    read_columns: ClassVar[tuple[str, ...]] = ("angle_rad", "value")
 
     plane: str
     radius_mm: float

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -37,6 +38,8 @@ class Diagonal(Observation):
     `direction` as in a `Line` (+1: approached from the start). `sigma` is the standard uncertainty of one
     reading in mm, `sigma_scale` that of the laser's scale. Raises ConfigError.
     """
+
+    read_columns: ClassVar[tuple[str, ...]] = ("distance_mm", "value")
 
     start_mm: Vector
     end_mm: Vector

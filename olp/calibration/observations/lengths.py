@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -46,6 +46,8 @@ class Lengths(Scattered):
     point to the reflector, `length_mm` (n,) the readings. `sigma_mm`, (n,) or one number, is their standard
     uncertainty, `sigma_scale` that of their common scale (mm/mm). Raises ConfigError.
     """
+
+    read_columns: ClassVar[tuple[str, ...]] = ("axis_mm", "length_mm")
 
     axis_mm: Array
     tool_mm: Array

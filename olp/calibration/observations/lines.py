@@ -13,7 +13,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -98,6 +98,8 @@ class Line(Observation):
     `sensors_degC` (n,) are the temperatures of the structure at each reading, by the name of the sensor.
     `sigma_lever_mm` is the standard uncertainty of its place and lever arm. Raises ConfigError.
     """
+
+    read_columns: ClassVar[tuple[str, ...]] = ("target_mm", "value")
 
     component: str
     target_mm: Array

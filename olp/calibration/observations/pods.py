@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -58,6 +58,8 @@ class Pods(Scattered):
     standard uncertainty in mm), pods counted from 0. Without one the scale is not observable. Raises
     ConfigError.
     """
+
+    read_columns: ClassVar[tuple[str, ...]] = ("axis_mm", "azimuth_rad", "elevation_rad")
 
     axis_mm: Array
     tool_mm: Array

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -41,6 +41,10 @@ FRAME_MM = 10.0
 CHUNK = 2000
 #: No coordinate is known better than this: 1 nm.
 LEAST_MM = 1e-6
+#: A mistake is evident where points without it are off by less than this share.
+_EVIDENT = 0.02
+#: Units that columns in mm may be in by mistake, and their size in mm.
+_UNITS = {"inches": 25.4, "m": 1e3, "um": 1e-3}
 #: The cosine of an elevation counts as no less than this, near the vertical of the instrument.
 STEEP = 0.1
 
@@ -56,6 +60,8 @@ class Points(Scattered):
     `covariance_mm2` (n, 3, 3), of the coordinates of each point, it is their root mean square. `sigma_scale`
     is the standard uncertainty of the instrument's scale (mm/mm). Raises ConfigError.
     """
+
+    read_columns: ClassVar[tuple[str, ...]] = ("axis_mm", "measured_mm")
 
     axis_mm: Array
     tool_mm: Array
@@ -123,6 +129,22 @@ class Points(Scattered):
             words = "its coordinates are left-handed: one of them has the other sign"
             found += [Alternative("handedness", words, other), *self.swapped()]
         return found
+
+    def evident_mistake(self) -> str:
+        own = rms(deviations(self))
+        named = [(one.words, one.observation) for one in self.alternatives()]
+        for unit, size in _UNITS.items():
+            wrong = f"its axis positions are in {unit}, or its measured ones are not"
+            named.append((f"its measured positions are in {unit}", self._times(size)))
+            named.append((wrong, self._times(1.0 / size)))
+        for words, other in named:
+            assert isinstance(other, Points)
+            if rms(deviations(other)) < _EVIDENT * own:
+                return words
+        return ""
+
+    def _times(self, factor: float) -> Points:
+        return replace(self, measured_mm=self.measured_mm * factor)
 
     def start(self, noise: Noise | None = None) -> PointsState:
         return PointsState(self)

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.observations.base import Observation
+from olp.calibration.observations.copies import refuse_copies
 from olp.calibration.observations.lines import SAME_MM, Line, targets_of
 from olp.calibration.observations.measurements import MapWish, Measurements
 from olp.calibration.observations.references import Square, Straightedge
@@ -92,6 +93,7 @@ def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> 
     if not gathered.errors:
         gathered.errors += _undefined_squares(gathered)
         gathered.errors += _open_straightedges(gathered)
+        gathered.errors += refuse_copies(gathered.observations)
         gathered.errors += [
             config_error([(None, f"{key} is missing; expected it in the plan or in a file")], "measurements")
             for key in ("machine", "measured", "temperature_degC")

@@ -137,6 +137,15 @@ RULES = (
         "A scale of 3 m with 7 targets: 0.3 um at them, 5 um between them.",
     ),
     _rule(
+        "OLP814",
+        "readings repeat to the last digit",
+        Severity.WARNING,
+        "A run of a line, or rows of points, are there twice, number by number. Readings that were taken "
+        "twice differ by noise. The fit counts them as two, so the stated uncertainty is too small.",
+        "Remove the copy. Keep both where the instrument shows too few digits to tell them apart.",
+        "Run 3 of a laser was saved again as run 4.",
+    ),
+    _rule(
         "OLP841",
         "errors beyond the rigid-body model",
         Severity.INFO,
