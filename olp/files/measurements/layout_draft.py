@@ -1,7 +1,8 @@
 """A profile of a text of readings, drafted from the text: what it shows is stated, the rest is asked for.
 
-The longest block of rows of two numbers shows the mark between columns and the decimal mark. The line above
-it has the names of columns. Targets are approached again and written alike each time; no reading repeats so.
+The longest block of rows of numbers shows the mark between columns and the marks in numbers. Readings begin
+at the first such rows of the text, and the line above them has the names of columns. Targets are approached
+again and written alike each time; no reading repeats so.
 """
 
 from __future__ import annotations
@@ -17,12 +18,22 @@ from olp.program.text.rows import Form
 
 #: What stands in the place of a value that the text does not show.
 ASKED = "?"
-#: Rows of numbers that are a block, at least.
+#: Rows of numbers that show how a text is laid out, at least.
 _FEWEST = 4
+#: Rows of numbers one after another that may be the first readings, at least.
+_FIRST = 2
 #: Positions are no farther from their targets than this share of their range.
 _CLOSE = 0.01
-#: Decimal marks, and what a number with each looks like.
-_DECIMALS = {"point": re.compile(r"[-+]?\d+(\.\d*)?"), "comma": re.compile(r"[-+]?\d+(,\d*)?")}
+#: Marks in numbers: decimal, its name, that of thousands, and the character of these.
+_MARKS = (
+    (".", "point", "none", ""),
+    (",", "comma", "none", ""),
+    (",", "comma", "point", "."),
+    (".", "point", "comma", ","),
+    (",", "comma", "apostrophe", "'"),
+    (".", "point", "apostrophe", "'"),
+    (",", "comma", "space", " "),
+)
 #: A number whose comma or point may as well part groups of three digits.
 _GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
 #: Units that readings and that positions may have.
@@ -35,12 +46,13 @@ _UNIT = re.compile(r".*[\[(]\s*(\S+?)\s*[\])]\s*")
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """Rows of numbers: the mark between columns, the decimal mark, (line, cells) of each row, and of the line
-    above them."""
+    """Rows of numbers: the mark between columns, those in numbers (of _MARKS), (line, cells) of each row, and
+    of the line above them. `first` is the line of the first rows of numbers of the text."""
 
     delimiter: Delimiter
-    decimal: str
+    marks: tuple[str, str, str, str]
     rows: tuple[tuple[int, list[str]], ...]
+    first: int
     above: tuple[int, list[str]] | None
 
     @property
@@ -53,34 +65,38 @@ class _Block:
 
 
 def drafted(text: str) -> dict[str, object] | None:
-    """The keys of a profile (olp-line-profile-1), `columns` last; None where the text has no block of two
-    columns of numbers."""
+    """The keys of a profile (olp-line-profile-1), `columns` last; None where the text has no block of numbers
+    in two columns, or in more of which one holds targets that are approached again."""
     blocks = [
         block
         for delimiter in ("semicolon", "tab", "comma", "space")
-        for decimal in _DECIMALS
-        if (delimiter, decimal) != ("comma", "comma")
-        and (block := _longest(text, delimiter, decimal)) is not None
-    ]
+        for marks in _MARKS
+        if DELIMITERS[delimiter] not in marks and not (delimiter == "space" and " " in marks)
+        and (block := _longest(text, delimiter, marks)) is not None
+    ]  # fmt: skip
     if not blocks:
         return None
     block = max(blocks, key=lambda one: len(one.rows))
-    names: Sequence[object] = range(1, 1 + len(block.rows[0][1]))
+    width = len(block.rows[0][1])
+    if width > 2 and _columns(block)[0] is None:
+        return None
+    names: Sequence[object] = range(1, 1 + width)
     if block.named and block.above is not None:
         names = block.above[1]
-    begin = block.above[0] if block.named and block.above is not None else block.rows[0][0]
+    begin = block.above[0] if block.named and block.above is not None else block.first
     target, value = _columns(block)
     units = [_unit(str(name)) for name in names]
     grouped = all(_GROUPED.fullmatch(cell) or cell.isdigit() for _, row in block.rows for cell in row)
     keys: dict[str, object] = {
         "schema": "olp-line-profile-1",
         "delimiter": block.delimiter,
-        "decimal": ASKED if grouped and _marked(block) else block.decimal,
+        "decimal": ASKED if grouped and _marked(block) else block.marks[1],
+        "thousands": block.marks[2],
         "header_lines": begin - 1,
         "header": block.named,
         "position_unit": _among(units, target, _OF_POSITIONS),
         "unit": _among(units, value, _OF_VALUES),
-        "holds": _held(block, target),
+        "holds": _held(block, target, value),
         "runs": "reversal",
     }
     columns = {"target": target, "value": value}
@@ -89,11 +105,12 @@ def drafted(text: str) -> dict[str, object] | None:
     }
 
 
-def _longest(text: str, delimiter: Delimiter, decimal: str) -> _Block | None:
-    """The longest run of rows of two numbers; empty lines between them do not count."""
+def _longest(text: str, delimiter: Delimiter, marks: tuple[str, str, str, str]) -> _Block | None:
+    """The longest run of rows of as many numbers, two or more; empty lines between them do not count."""
     form = Form(DELIMITERS[delimiter], (), loose=True)
-    number = _DECIMALS[decimal]
-    best: _Block | None = None
+    number = _pattern(marks)
+    best: list[tuple[int, list[str]]] = []
+    begins: list[tuple[int, int, tuple[int, list[str]] | None]] = []
     rows: list[tuple[int, list[str]]] = []
     above: tuple[int, list[str]] | None = None
     before: tuple[int, list[str]] | None = None
@@ -101,35 +118,53 @@ def _longest(text: str, delimiter: Delimiter, decimal: str) -> _Block | None:
         if not whole.strip():
             continue
         cells = form.cells(whole)
-        if len(cells) == 2 and all(number.fullmatch(cell) for cell in cells):
+        if len(cells) > 1 and all(number.fullmatch(cell) for cell in cells):
+            if rows and len(rows[0][1]) != len(cells):
+                rows = []
             above = above if rows else before
             rows.append((line, cells))
-            if len(rows) >= _FEWEST and (best is None or len(rows) > len(best.rows)):
-                best = _Block(delimiter, decimal, tuple(rows), above)
+            if len(rows) == _FIRST:
+                begins.append((len(cells), rows[0][0], above))
+            best = rows if len(rows) > len(best) else best
         else:
             rows = []
         before = line, cells
-    return best
+    if len(best) < _FEWEST:
+        return None
+    width = len(best[0][1])
+    first, over = next((line, over) for count, line, over in begins if count == width)
+    return _Block(delimiter, marks, tuple(best), first, over)
+
+
+def _pattern(marks: tuple[str, str, str, str]) -> re.Pattern[str]:
+    """What a number with these marks looks like."""
+    decimal, _, _, group = marks
+    whole = rf"(?:[1-9]\d{{0,2}}(?:{re.escape(group)}\d{{3}})+|\d+)" if group else r"\d+"
+    return re.compile(rf"[-+]?{whole}(?:{re.escape(decimal)}\d*)?")
 
 
 def _columns(block: _Block) -> tuple[int | None, int | None]:
     """The columns of targets and of readings, None where rows do not show which is which."""
     repeated = []
-    for column in range(2):
+    width = len(block.rows[0][1])
+    for column in range(width):
         cells = [row[column] for _, row in block.rows]
         counts = np.unique(cells, return_counts=True)[1]
         repeated.append(len(counts) > 1 and counts.min() > 1 and counts.min() == counts.max())
-    if repeated[0] == repeated[1]:
+    if sum(repeated) != 1:
         return None, None
-    return (0, 1) if repeated[0] else (1, 0)
+    target = repeated.index(True)
+    return target, 1 - target if width == 2 else None
 
 
-def _held(block: _Block, target: int | None) -> str:
+def _held(block: _Block, target: int | None, value: int | None) -> str:
     """Whether the readings are positions, which are close to the targets, or errors."""
-    if target is None:
+    if target is None or value is None:
         return ASKED
-    numbers = np.array([[float(cell.replace(",", ".")) for cell in row] for _, row in block.rows])
-    off = np.abs(numbers[:, 1] - numbers[:, 0]).max()
+    decimal, _, _, group = block.marks
+    plain = [[cell.replace(group, "").replace(decimal, ".") for cell in row] for _, row in block.rows]
+    numbers = np.array(plain).astype(float)
+    off = np.abs(numbers[:, value] - numbers[:, target]).max()
     return "position" if off < _CLOSE * np.ptp(numbers[:, target]) else "error"
 
 
@@ -150,4 +185,4 @@ def _marked(block: _Block) -> bool:
 
 
 def _is_number(cell: str) -> bool:
-    return any(number.fullmatch(cell) for number in _DECIMALS.values())
+    return any(_pattern(marks).fullmatch(cell) for marks in _MARKS)

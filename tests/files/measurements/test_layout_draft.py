@@ -64,6 +64,36 @@ def test_what_a_text_leaves_open_is_asked_for() -> None:
     assert drafted("three words here\nand 1.5 more\n") is None
 
 
+@pytest.mark.parametrize(
+    ("decimal", "group", "name"), [(",", ".", "point"), (".", ",", "comma"), (",", " ", "space")]
+)
+def test_groups_of_digits_lose_no_reading(decimal: str, group: str, name: str) -> None:
+    """Only rows above 999 have them, and no row before these may be taken for the head."""
+    targets = [0.0, 800.0, 1600.0, 2400.0, 3200.0, 3200.0, 2400.0, 1600.0, 800.0, 0.0]
+    marked = str.maketrans({",": group, ".": decimal})
+    rows = [f"{q:,.3f}".translate(marked) + f";{k:.2f}".replace(".", decimal) for k, q in enumerate(targets)]
+    keys = drafted("\n".join(["Soll [mm];Abw [um]", *rows]) + "\n")
+    assert keys is not None and (keys["header_lines"], keys["thousands"]) == (0, name)
+    data = "\n".join(["Soll [mm];Abw [um]", *rows]).encode()
+    readings = parse_line(data, "x.txt", validate(LineProfile, keys, {}, "p.toml"))
+    assert readings.target_mm.tolist() == targets
+
+
+def test_a_short_first_run_is_no_head() -> None:
+    """Text between runs is not read over in silence: the profile begins above the first run."""
+    runs = ["0;1.5", "10;2.5", "20;3.5", "Lauf 2", "0;1.6", "10;2.4", "20;3.6", "30;4.5"]
+    keys = drafted("\n".join(["Soll;Abw", *runs]) + "\n")
+    assert keys is not None and keys["header_lines"] == 0 and keys["header"] is True
+
+
+def test_of_more_columns_that_of_the_targets_is_found() -> None:
+    rows = [f"{k};{q};{q + 0.01 * k + 0.003:.3f};{k + 0.5}" for k, q in enumerate(TARGETS)]
+    keys = drafted("\n".join(["Nr;Soll [mm];Ist [mm];Abw [um]", *rows]) + "\n")
+    assert keys is not None
+    assert keys["columns"] == {"target": "Soll [mm]", "value": ASKED} and keys["holds"] == ASKED
+    assert drafted("\n".join(f"{k};{k + 1};{k + 2}" for k in range(9))) is None
+
+
 def test_files_that_are_laid_out_alike_share_a_draft(tmp_path: Path) -> None:
     for name in ("exx.txt", "eyy.txt"):
         (tmp_path / name).write_text(text_of(";", ",", ["Soll [mm];Abw"], False))
