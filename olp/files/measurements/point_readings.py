@@ -9,8 +9,9 @@ to the reflector where it differs from point to point. Other instruments have ot
 measured ones. Lengths from a station: length_mm. A polar station: distance_mm, azimuth_deg and elevation_deg.
 Directions from pods: azimuth_1_deg, elevation_1_deg, azimuth_2_deg ...
 
-Columns may be in inches, m, gon or rad: X_inch, measured_X_m, azimuth_1_gon. Semicolons may separate them,
-with a comma or a point in numbers.
+Columns may be in inches, m, gon or rad: X_inch, measured_X_m, azimuth_1_gon. Angles in columns such as
+azimuth_1_dms are degrees, minutes and seconds: 95 20 24.9, 95-20-24.9 or with their signs. Semicolons or tabs
+may separate columns, with a comma or a point in numbers.
 
 Measured positions may have uncertainties of their own, in the frame of their coordinates: sigma_X_um,
 sigma_Y_um, sigma_Z_um, or covariance_XX_um2, covariance_XY_um2, covariance_XZ_um2, covariance_YY_um2 ...
@@ -20,6 +21,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Literal
@@ -27,7 +29,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, Mask
 from olp.core.errors import ConfigError
 from olp.core.schema import Table
 from olp.core.schema_keys import Field
@@ -58,8 +60,13 @@ _UNITS = (
     ("_inch", "_mm", 25.4),
     ("_m", "_mm", 1e3),
     ("_gon", "_deg", 0.9),
+    ("_dms", "_deg", 1.0),
     ("_rad", "_deg", 180.0 / math.pi),
 )
+
+
+#: Degrees, minutes and seconds, with anything between them that instruments write there.
+_DMS = re.compile(r"([-+]?)(\d{1,3})[°d: -]+(\d{1,2})['\u2032m: -]+(\d{1,2}(?:\.\d*)?)[\"\u2033s' ]*")
 
 
 def directions(pods: int) -> tuple[str, ...]:
@@ -86,9 +93,17 @@ class AngleKeys(Table):
 
 
 def conventional(angles: AngleKeys, azimuth: Array, vertical: Array) -> tuple[Array, Array]:
-    """Azimuths counter-clockwise and elevations in rad, from angles in rad as the instrument counts them."""
+    """Azimuths counter-clockwise and elevations in rad, from angles in rad as the instrument counts them. A
+    zenith angle above half a turn was read in the second face, as if the telescope looked backward."""
     up = 0.5 * math.pi - vertical if angles.vertical == "zenith" else vertical
-    return np.asarray(AZIMUTHS[angles.azimuth] * azimuth), np.asarray(up)
+    second = in_second_face(angles, vertical)
+    up = np.where(second, -math.pi - up, up)
+    return np.asarray(AZIMUTHS[angles.azimuth] * azimuth + math.pi * second), np.asarray(up)
+
+
+def in_second_face(angles: AngleKeys, vertical: Array) -> Mask:
+    """Which vertical angles in rad were read in the second face of a theodolite."""
+    return np.asarray((angles.vertical == "zenith") & (vertical > math.pi) & (vertical < 2.0 * math.pi))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -201,15 +216,25 @@ def _form_of(text: str, file: str) -> tuple[Form, Callable[[str, str], tuple[flo
     """How a text separates its columns, and how it writes numbers. Raises ConfigError where that is not
     certain: numbers with commas beside numbers with points."""
     data = [line for _, line in CSV.lines(text) if CSV.holds(line)]
-    if not data or ";" not in data[0]:
+    mark = next((mark for mark in ";\t" if data and mark in data[0]), None)
+    if mark is None:
         return CSV, _number
     values = "".join(data[1:])
     if "," in values and "." in values:
         raise ConfigError("has numbers with commas and with points; expected one of them", file=file)
-    return Form(";"), lambda name, cell: _number(name, cell.replace(",", "."))
+    return Form(mark), lambda name, cell: _number(name, cell.replace(",", "."))
 
 
 def _number(name: str, cell: str) -> tuple[float, str | None]:
-    value = finite(cell)
-    wrong = f'{name} = "{cell}"; expected a number in {name.rpartition("_")[2]}'
+    value = _of_dms(cell) if name.endswith("_dms") else finite(cell)
+    what = "degrees, minutes and seconds" if name.endswith("_dms") else name.rpartition("_")[2]
+    wrong = f'{name} = "{cell}"; expected a number in {what}'
     return value, wrong if math.isnan(value) else None
+
+
+def _of_dms(cell: str) -> float:
+    """Degrees from degrees, minutes and seconds; NaN for anything else."""
+    match = _DMS.fullmatch(cell.strip())
+    if match is None or int(match[3]) > 59 or float(match[4]) >= 60.0:
+        return math.nan
+    return (-1.0 if match[1] == "-" else 1.0) * (int(match[2]) + int(match[3]) / 60 + float(match[4]) / 3600)

@@ -79,11 +79,13 @@ def test_groups_of_digits_lose_no_reading(decimal: str, group: str, name: str) -
     assert readings.target_mm.tolist() == targets
 
 
-def test_a_short_first_run_is_no_head() -> None:
+@pytest.mark.parametrize("named", [True, False])
+def test_a_short_first_run_is_no_head(named: bool) -> None:
     """Text between runs is not read over in silence: the profile begins above the first run."""
     runs = ["0;1.5", "10;2.5", "20;3.5", "Lauf 2", "0;1.6", "10;2.4", "20;3.6", "30;4.5"]
-    keys = drafted("\n".join(["Soll;Abw", *runs]) + "\n")
-    assert keys is not None and keys["header_lines"] == 0 and keys["header"] is True
+    keys = drafted("\n".join(["Soll;Abw" if named else "Laser", *runs]) + "\n")
+    assert keys is not None
+    assert (keys["header_lines"], keys["header"]) == ((0, True) if named else (1, False))
 
 
 def test_of_more_columns_that_of_the_targets_is_found() -> None:
