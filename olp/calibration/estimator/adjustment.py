@@ -7,7 +7,7 @@ covariance of all of it, so that it also shows what is not observable from these
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,15 +15,17 @@ import numpy as np
 from olp.calibration.estimator.basis import Wave
 from olp.calibration.estimator.beside import block_of, shares_of
 from olp.calibration.estimator.fitted import Fit
+from olp.calibration.estimator.joint_search import found
 from olp.calibration.estimator.lined import Lined
 from olp.calibration.estimator.model import MOST, Model, artefacts_of
 from olp.calibration.estimator.normal import Block, Normal, Solved, solve
 from olp.calibration.estimator.parameters import Parameters
 from olp.calibration.estimator.prior import Prior
-from olp.calibration.estimator.unread import Unread
+from olp.calibration.estimator.unread import Readings, Unread
 from olp.calibration.observations.base import Noise, Outlier, Result, ScatteredState, State
 from olp.calibration.observations.lines import Line
 from olp.calibration.observations.measurements import Measurements
+from olp.core.arrays import Array
 from olp.core.machine import Vector
 from olp.core.progress import Progress, silent
 from olp.core.units import AXES
@@ -152,13 +154,16 @@ def _iterate(start: _Start, unread: Unread, learning: int, tell: Progress) -> _S
     states, outliers, waves = start.states, [*start.outliers], start.model.waves
     theta = np.zeros(0)
     for turn in range(PASSES):
-        parameters = start.model.parameters(waves)
-        squares = artefacts_of(start.measurements, parameters)
-        prior = Prior(parameters, unread.lined.shapes(), squares, unread.classes)
-        theta = theta if len(theta) == parameters.size else np.zeros(parameters.size)
-        # before the first pass the places of instruments are only near
-        if turn < learning and unread.learn(prior, states, theta):
-            prior = Prior(parameters, unread.lined.shapes(), squares, unread.classes)
+        prior = _prior(start, unread, waves)
+        theta = _sized(theta, prior)
+        if turn < learning:
+            # before the first pass the places of instruments are only near
+            if unread.heard and _found(unread, prior, states, theta):
+                prior = _prior(start, unread, waves)
+                theta = _sized(theta, prior)
+            if unread.learn(prior, states, theta):
+                prior = _prior(start, unread, waves)
+        parameters = prior.parameters
         blocks = [block_of(state, theta, parameters, prior.hidden) for state in states]
         tell("adjustment", 0.5)
         normal, solved = _adjusted(blocks, prior)
@@ -173,6 +178,27 @@ def _iterate(start: _Start, unread: Unread, learning: int, tell: Progress) -> _S
         outliers += [slip for some in slips for slip in some]
         states = [state.moved(step, some) for state, step, some in zip(states, steps, slips, strict=True)]
     return _Settled(states, blocks, outliers, prior, unread, normal, solved)
+
+
+def _prior(start: _Start, unread: Unread, waves: Mapping[str, tuple[Wave, ...]]) -> Prior:
+    """The unknowns with these cyclic terms and the joints found so far, and what is expected of them."""
+    parameters = start.model.parameters(waves, unread.joints)
+    squares = artefacts_of(start.measurements, parameters)
+    return Prior(parameters, unread.lined.shapes(), squares, unread.classes, unread.joints)
+
+
+def _sized(theta: Array, prior: Prior) -> Array:
+    """theta, or zeros where it is that of other unknowns."""
+    return theta if len(theta) == prior.parameters.size else np.zeros(prior.parameters.size)
+
+
+def _found(unread: Unread, prior: Prior, states: Sequence[State], theta: Array) -> bool:
+    """Adds the joints of rails that readings show beside those that are known; whether there are any."""
+    readings = Readings.of(prior, states, theta)
+    before = unread.joints
+    if readings is not None:
+        unread.joints = found(readings, before)
+    return unread.joints != before
 
 
 def _finish(start: _Start, end: _Settled) -> Fit:

@@ -218,16 +218,16 @@ class CurveSpace:
         """(n, size) values at q (n,)."""
         return np.asarray(self.raw_values(q) @ self.gauge)
 
-    def process(self, scales: Scales, amplitude: float) -> Array:
+    def process(self, scales: Scales, amplitude: float, feature: float | None = None) -> Array:
         """(size, size) precision of the sum of the processes; `amplitude` is the standard deviation of the
-        coefficients of straight lines and of features."""
+        coefficients of straight lines, and of features unless theirs is `feature`."""
         lines, bent = self.spline.lines(), self.spline.bent()
         covariance = bent.T @ np.tensordot(scales.values**2, self.spline.processes(), 1) @ bent
         values, vectors = np.linalg.eigh(covariance)
         turned = bent @ vectors
         rough = (turned / np.maximum(values, _LEAST_SHARE * values[-1])) @ turned.T
         m = self.spline.count
-        full = np.eye(m + len(self.features)) / amplitude**2
+        full = np.eye(m + len(self.features)) / (feature or amplitude) ** 2
         full[:m, :m] = rough + lines @ lines.T / amplitude**2
         return np.asarray(self.gauge.T @ full @ self.gauge)
 

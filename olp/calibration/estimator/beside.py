@@ -96,6 +96,13 @@ def shares_of(
     return Block(np.arange(size), whole.precision, lambda: plain, whole.label), shares
 
 
+def gains_of(state: ScatteredState | AlongState, theta: Array, parameters: Parameters) -> Array:
+    """(n, curves) by how much the readings of a state change with each curve where they were taken."""
+    unit = dict.fromkeys(parameters.spaces, Hidden(np.zeros(1), np.ones(1)))
+    whole, size = _whole(state, theta, parameters, unit, parameters)
+    return np.concatenate([chunk.rows[:, size:] for chunk in whole.chunks()])
+
+
 def _whole(
     state: ScatteredState | AlongState, theta: Array, parameters: Parameters, hidden: Mapping[str, Hidden],
     unknowns: Unknowns,

@@ -119,6 +119,8 @@ class Fit:
         space = self.parameters.spaces[name]
         raw = space.gauge @ self.theta[self.parameters.slices[name]]
         total = self.prior.hidden[name].at(q)
+        if name not in self.prior.shapes:
+            return total
         for feature, jump in zip(space.features, raw[space.spline.count :], strict=True):
             if isinstance(feature, Step):
                 u = feature.values(q)

@@ -12,6 +12,7 @@ from olp.calibration.estimator.basis import CurveSpace, Scales, Spline, Step, Wa
 from olp.calibration.estimator.between import Hidden, hidden
 from olp.calibration.estimator.character import of_others
 from olp.calibration.estimator.parameters import MeasuringLine, Parameters
+from olp.calibration.estimator.rail_joints import Joints
 from olp.calibration.estimator.smoothing import AMPLITUDE, Features, Hides, Shape, features_of, shapes_of
 from olp.calibration.iso230.separation import aliased
 from olp.calibration.observations.base import Noise, Observation, Scattered
@@ -77,15 +78,16 @@ class Model:
         framed = any(taken.framed for taken in observations)
         return cls(chain, (x, y, z), box, lines, splines, shapes, others, hides, waves, unobservable, framed)
 
-    def parameters(self, waves: Mapping[str, tuple[Wave, ...]]) -> Parameters:
-        """The layout of theta with some cyclic terms."""
+    def parameters(self, waves: Mapping[str, tuple[Wave, ...]], joints: Joints) -> Parameters:
+        """The layout of theta with some cyclic terms, and with joints of curves without lines."""
         own_lines = [line for line, _ in self.lines]
         spaces, halves, lines = {}, {}, {}
         for name in COMPONENTS:
             axis = AXES.index(name[2])
             spline, shape = self.splines[axis], self.shapes.get(name)
             kind = "straight" if name[1] in AXES and name[1] != name[2] else "zero"
-            spaces[name] = CurveSpace.of(spline, shape.features if shape else (), self.datum_mm[axis], kind)
+            features = shape.features if shape else tuple(one.step for one in joints.get(name, ()))
+            spaces[name] = CurveSpace.of(spline, features, self.datum_mm[axis], kind)
             if shape is not None and shape.half != "none":
                 half = _half(spline)
                 gauge = np.eye(half.count) if shape.half == "curve" else np.ones((half.count, 1))

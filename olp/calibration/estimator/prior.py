@@ -13,6 +13,7 @@ from olp.calibration.estimator.between import Hidden, beside_cells, in_cells
 from olp.calibration.estimator.character import class_of
 from olp.calibration.estimator.normal import Normal
 from olp.calibration.estimator.parameters import Parameters
+from olp.calibration.estimator.rail_joints import Joints, size_of
 from olp.calibration.estimator.smoothing import AMPLITUDE, FEATURE, HALF, Shape
 from olp.calibration.observations.points import FRAME_MM
 from olp.calibration.observations.sensors import per_kelvin, shapes_of
@@ -37,6 +38,7 @@ class Prior:
     shapes: Mapping[str, Shape]
     squares: Mapping[str, tuple[float, float]]
     classes: Mapping[str, Class]
+    joints: Joints = field(default_factory=dict)
     _blocks: dict[tuple[str, Class], tuple[Array, float]] = field(default_factory=dict)
 
     @property
@@ -46,11 +48,15 @@ class Prior:
 
     def hidden_of(self, classes: Mapping[str, Class]) -> dict[str, Hidden]:
         """The same with other classes."""
-        return {
-            name: self.shapes[name].hidden if name in self.shapes
-            else beside_cells(space.spline, classes[class_of(name)][1])
-            for name, space in self.parameters.spaces.items()
-        }  # fmt: skip
+        found = {}
+        for name, space in self.parameters.spaces.items():
+            if name in self.shapes:
+                found[name] = self.shapes[name].hidden
+                continue
+            found[name] = beside_cells(space.spline, classes[class_of(name)][1])
+            for joint in self.joints.get(name, ()):
+                found[name] = joint.beside(found[name])
+        return found
 
     def precision(self, classes: Mapping[str, Class] | None = None) -> tuple[Array, float]:
         """(n, n) prior precision and its log determinant; the prior mean of all but squares is zero."""
@@ -84,7 +90,7 @@ class Prior:
 
     def with_shapes(self, shapes: Mapping[str, Shape]) -> Prior:
         """The same with other shapes of curves with lines."""
-        return Prior(self.parameters, shapes, self.squares, self.classes, self._blocks)
+        return replace(self, shapes=shapes)
 
     def _block(self, name: str, one: Class) -> tuple[Array, float]:
         """The precision of a curve and its log determinant. Those without lines are as their class."""
@@ -93,10 +99,10 @@ class Prior:
             one = AMPLITUDE[name[1] in "ABC"], shape.scales
         else:
             # coefficients that move together share one size
-            one = one[0] * np.sqrt(space.size), in_cells(one[1])
+            one = one[0] * np.sqrt(space.size - len(space.features)), in_cells(one[1])
         found = self._blocks.get((name, one))
         if found is None:
-            block = space.process(one[1], one[0])
+            block = space.process(one[1], one[0], None if shape is not None else size_of(name))
             found = self._blocks[name, one] = block, float(np.linalg.slogdet(block)[1])
         return found
 
@@ -106,7 +112,7 @@ class Prior:
             name: replace(shape, scales=Scales.of(ROUGHER * shape.scales.values))
             for name, shape in self.shapes.items()
         }
-        return Prior(self.parameters, shapes, self.squares, self.classes)
+        return self.with_shapes(shapes)
 
     def push(self, normal: Normal) -> None:
         """Add the prior means to the right side."""

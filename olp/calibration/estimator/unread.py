@@ -17,8 +17,7 @@ import numpy as np
 
 from olp.calibration.estimator import lined
 from olp.calibration.estimator.basis import Scales
-from olp.calibration.estimator.beside import block_of, shares_of
-from olp.calibration.estimator.between import Hidden
+from olp.calibration.estimator.beside import block_of, gains_of, shares_of
 from olp.calibration.estimator.character import (
     RIPPLE,
     SIZES,
@@ -31,10 +30,12 @@ from olp.calibration.estimator.character import (
 from olp.calibration.estimator.lined import Levels, Lined, level_of
 from olp.calibration.estimator.normal import Block, Chunk, Normal, evidence
 from olp.calibration.estimator.prior import Class, Prior
+from olp.calibration.estimator.rail_joints import Joints
 from olp.calibration.estimator.smoothing import Shape
 from olp.calibration.observations.base import ScatteredState, State
 from olp.calibration.observations.radial import AlongState
 from olp.core.arrays import Array
+from olp.core.units import AXES
 from olp.core.values import dataclass
 
 #: The straight part of a curve against a usual smooth part, or a larger one. Positioning has a scale of its
@@ -88,6 +89,7 @@ class Unread:
     own: dict[str, _Character] = field(init=False)
     sized: bool = field(init=False)
     heard: bool = field(init=False)
+    joints: Joints = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.own = {kind: _Character(*_expectations(table)) for kind, table in self.before.items()}
@@ -104,7 +106,7 @@ class Unread:
 
     def learn(self, prior: Prior, states: Sequence[State], theta: Array) -> bool:
         """Adds what readings beside lines say of the classes; False where there are no such readings."""
-        readings = _Readings.of(prior, states, theta)
+        readings = Readings.of(prior, states, theta)
         if readings is None:
             return False
         normal = readings.normal(self.own, self.lined.shapes())
@@ -129,7 +131,7 @@ class Unread:
         self.sized = self.heard = True
         return True
 
-    def _find(self, readings: _Readings, kinds: Sequence[str]) -> None:
+    def _find(self, readings: Readings, kinds: Sequence[str]) -> None:
         """Where to begin, all classes alike: the most probable of few candidates of everything together. What
         explains kinks is either of a rough kind or full of steps, and from one the other is not found."""
         tables = [self.before[kind] for kind in kinds]
@@ -154,7 +156,7 @@ class Unread:
                     best, most = own, value
         self.own = best
 
-    def _learn_ripple(self, readings: _Readings, bound: float) -> None:
+    def _learn_ripple(self, readings: Readings, bound: float) -> None:
         """Ripple of all curves, also of those with lines, by one factor. Cells hide most of it: that is
         noise of readings."""
         now = {kind: max(one.ripple, LEAST_RIPPLE) for kind, one in self.own.items()}
@@ -171,7 +173,7 @@ class Unread:
         times = float(np.sqrt(share @ np.square(TIMES)))
         self.own = {kind: replace(one, ripple=times * now[kind]) for kind, one in self.own.items()}
 
-    def _learn_steps(self, readings: _Readings, kinds: Sequence[str], bound: float) -> None:
+    def _learn_steps(self, readings: Readings, kinds: Sequence[str], bound: float) -> None:
         """Steps of all curves, alike in all classes. Cells hide some of them, too."""
         kinds = kinds or list(self.own)
         values = _log(np.mean([self.before[kind].sum(axis=(0, 1, 3)) for kind in kinds], axis=0))
@@ -187,7 +189,7 @@ class Unread:
         size = float(np.sqrt(share @ STEPS**2))
         self.own.update({kind: replace(self.own[kind], steps=size) for kind in kinds})
 
-    def _learn_kinds(self, readings: _Readings, kinds: Sequence[str], bound: float) -> None:
+    def _learn_kinds(self, readings: Readings, kinds: Sequence[str], bound: float) -> None:
         """The kind of the smooth part is that of the machine."""
         kinds = kinds or list(self.own)
         values = _log(np.mean([self.before[kind].sum(axis=(1, 2, 3)) for kind in kinds], axis=0))
@@ -201,7 +203,7 @@ class Unread:
         self.own.update({kind: replace(self.own[kind], kinds=tuple(share.tolist())) for kind in kinds})
 
     def _shares(
-        self, readings: _Readings, axis: int, levels: Levels, values: Array,
+        self, readings: Readings, axis: int, levels: Levels, values: Array,
         changed: Callable[[int], Mapping[str, _Character]], bound: float,
     ) -> Array:  # fmt: skip
         """(n,) probabilities of levels of an axis, with logarithms `values` (n,) before readings; those less
@@ -215,7 +217,7 @@ class Unread:
         self.lined.hear(axis, levels, share)
         return share
 
-    def _learn_size(self, readings: _Readings, kind: str) -> None:
+    def _learn_size(self, readings: Readings, kind: str) -> None:
         own = self.own[kind]
         near = np.abs(np.log2(SIZES / own.size)) <= _NEAR + 0.5
         score = readings.score(self.own, self.lined.shapes())
@@ -230,22 +232,23 @@ class Unread:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Readings:
+class Readings:
     """Normal equations of lines, and all other readings (n,) with the precision of their own unknowns. `now`
-    (n, curves) is the variance that curves hide at them, `each` the same where all hide a variance of 1."""
+    (n, curves) is the variance that curves hide at them, `gain` how much they change with each curve where
+    they are, at `position` (n, 3)."""
 
     prior: Prior
     lines: Normal
     chunk: Chunk
     precision: Array
     now: Array
-    each: Array
+    gain: Array
+    position: Array
 
     @classmethod
-    def of(cls, prior: Prior, states: Sequence[State], theta: Array) -> _Readings | None:
+    def of(cls, prior: Prior, states: Sequence[State], theta: Array) -> Readings | None:
         """None where no readings are scattered."""
         p, hidden = prior.parameters, prior.hidden
-        unit = dict.fromkeys(hidden, Hidden(np.zeros(1), np.ones(1)))
         wide = [state for state in states if isinstance(state, ScatteredState | AlongState) and state.apart]
         if not wide:
             return None
@@ -254,27 +257,37 @@ class _Readings:
             if state not in wide:
                 lines.add(block_of(state, theta, p, hidden))
         prior.push(lines)
-        every = math.ceil(sum(_rows(state) for state in wide) / ENOUGH)
+        every = math.ceil(sum(len(state.positions()) for state in wide) / ENOUGH)
         thin = [_thinned(state, every) for state in wide]
         blocks, now = zip(*(shares_of(state, theta, p, hidden) for state in thin), strict=True)
-        each = [shares_of(state, theta, p, unit)[1] for state in thin]
+        gain = np.concatenate([gains_of(state, theta, p) for state in thin])
+        position = np.concatenate([state.positions() for state in thin])
         chunk = _joined([_joined(list(block.chunks())) for block in blocks], apart=True)
         precision = np.concatenate([block.precision for block in blocks])
-        return cls(prior, lines, chunk, precision, np.concatenate(now), np.concatenate(each))
+        return cls(prior, lines, chunk, precision, np.concatenate(now), gain, position)
 
-    def normal(self, own: Mapping[str, _Character], shapes: Mapping[str, Shape]) -> Normal:
-        """All of them, with noise as curves of such characters and shapes make it."""
+    @property
+    def names(self) -> list[str]:
+        """The curves of the columns of `gain`."""
+        return list(self.prior.parameters.spaces)
+
+    def noisy(self, classes: Mapping[str, Class], shapes: Mapping[str, Shape]) -> Chunk:
+        """All but lines, with noise as curves of such classes and shapes make it."""
         variance = np.zeros(len(self.chunk.y))
-        for k, (name, one) in enumerate(self.prior.hidden_of(_classes(own)).items()):
+        for k, (name, one) in enumerate(self.prior.hidden_of(classes).items()):
             shape = shapes.get(name)
             if shape is None:
-                variance = variance + self.each[:, k] * one.variance[0]
+                own_variance = one.at(self.position[:, AXES.index(name[2])])
+                variance = variance + self.gain[:, k] ** 2 * own_variance
             else:
                 times = shape.hidden.variance.mean() / max(float(one.variance.mean()), 1e-300)
                 variance = variance + times * self.now[:, k]
+        return replace(self.chunk, beside=np.sqrt(variance))
+
+    def normal(self, own: Mapping[str, _Character], shapes: Mapping[str, Shape]) -> Normal:
+        """All of them, with that noise."""
         normal = replace(self.lines, H=self.lines.H.copy(), g=self.lines.g.copy())
-        chunk = replace(self.chunk, beside=np.sqrt(variance))
-        normal.add(Block.of(chunk, np.arange(len(normal.g)), self.precision))
+        normal.add(Block.of(self.noisy(_classes(own), shapes), np.arange(len(normal.g)), self.precision))
         return normal
 
     def evidence(self, own: Mapping[str, _Character], shapes: Mapping[str, Shape]) -> float:
@@ -299,12 +312,6 @@ class _Readings:
 
 def _classes(own: Mapping[str, _Character]) -> dict[str, Class]:
     return {kind: one.of(kind) for kind, one in own.items()}
-
-
-def _rows(state: ScatteredState | AlongState) -> int:
-    if isinstance(state, AlongState):
-        return state.count
-    return len(state.spread_over_rows(np.ones(state.count, np.int64)))
 
 
 def _thinned(state: ScatteredState | AlongState, every: int) -> ScatteredState | AlongState:

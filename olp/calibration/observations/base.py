@@ -257,6 +257,11 @@ class ScatteredState(State):
     def spread_over_rows(self, numbers: Index) -> Index:
         """A number of each point (n,), from 1, as that of each row of the block; 0 for rows of no point."""
 
+    def positions(self) -> Array:
+        """(rows, 3) the axis position of each row; rows of no point have that of the first one."""
+        numbers = self.spread_over_rows(np.arange(1, self.count + 1))
+        return np.asarray(self.observation.axis_mm[np.maximum(numbers - 1, 0)])
+
 
 T = TypeVar("T", bound=Scattered)
 

@@ -114,6 +114,9 @@ class CirclesState(AlongState):
     def count(self) -> int:
         return int(circle_used(self.observation).sum())
 
+    def positions(self) -> Array:
+        return circle_positions(self.observation)[circle_used(self.observation)]
+
     def block(self, parameters: Unknowns, theta: Array) -> Block:
         return circle_block(self.observation, parameters)
 

@@ -148,6 +148,9 @@ class DiagonalState(AlongState):
     def count(self) -> int:
         return len(self.observation.value)
 
+    def positions(self) -> Array:
+        return diagonal_positions(self.observation)
+
     def block(self, parameters: Unknowns, theta: Array) -> Block:
         return diagonal_block(self.observation, parameters, self.noise)
 

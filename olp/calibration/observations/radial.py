@@ -41,6 +41,10 @@ class AlongState(State):
         """Its name in the report."""
 
     @abstractmethod
+    def positions(self) -> Array:
+        """(rows, 3) the axis position of each row."""
+
+    @abstractmethod
     def block(self, parameters: Unknowns, theta: Array) -> Block: ...
 
     def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
