@@ -110,6 +110,12 @@ def refine_calibration(
     growth = known.growth_per_year if growth_per_year is None else growth_per_year
     if growth_per_year and (date is None or old.measured is None):
         raise ConfigError("growth_per_year needs the day of the run; give it (--date)", file=str(calibration))
+    if date is not None and old.measured is not None and date < old.measured:
+        raise ConfigError(
+            f"was measured on {old.measured}, after the day of the run, {date}; expected a run of that day "
+            "or later. To use older readings too, fit all of them together (olp calibrate fit)",
+            file=str(calibration),
+        )
     days = None if date is None or old.measured is None else (date - old.measured).days
     known = dataclasses.replace(known, growth_per_year=growth).aged(days)
     skip = frozenset(described.compensated_by_controller - old.active_during_measurement)

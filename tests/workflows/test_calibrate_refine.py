@@ -259,6 +259,13 @@ def test_fading_needs_the_day_of_the_run(tmp_path: Path) -> None:
         )
 
 
+def test_a_run_before_the_calibration_is_refused(tmp_path: Path) -> None:
+    calibration, _ = begun_files(tmp_path)
+    points, machine = (PROGRAMS / "gantry-lines" / name for name in ("tracker.csv", "machine.toml"))
+    with pytest.raises(ConfigError, match="after the day of the run, 2026-04-19"):
+        refine_calibration(calibration, points, machine, date=datetime.date(2026, 4, 19))
+
+
 def begun_files(folder: Path) -> tuple[Path, Uncertainty]:
     """A calibration of one squareness with its uncertainty."""
     file = folder / "calibration.toml"

@@ -55,6 +55,9 @@ COVARIANCE = tuple(
 )
 
 
+#: No instrument knows a coordinate better than this, um.
+_LEAST_UM = 0.01
+
 #: Units that columns may have instead: the ends of their names, and the factor between both.
 _UNITS = (
     ("_inch", "_mm", 25.4),
@@ -193,6 +196,13 @@ def covariances(values: Array, lines: npt.NDArray[np.int64], file: str) -> Array
                 for k in wrong[:8]
             ],
             file,
+        )
+    least = float(np.sqrt(np.trace(matrix, axis1=1, axis2=2).min() / 3.0))
+    if least < _LEAST_UM:
+        raise ConfigError(
+            f"states an uncertainty of {least:.2g} um of a coordinate, which no instrument reaches; expected "
+            "columns in um or um^2, not in mm or mm^2",
+            file=file,
         )
     return matrix * MM_PER_UM**2
 

@@ -54,6 +54,13 @@ def test_uncertainties_of_coordinates_are_read(tmp_path: Path) -> None:
         ((), (), "", "sigma_um is missing"),
         (SIGMA, (5.0, 0.0, 3.0), "", "line 2: the covariance of the point is not positive"),
         (SIGMA, (5.0, -4.0, 3.0), "", "line 2: the covariance of the point is not positive"),
+        (
+            COVARIANCE,
+            (25e-6, 0.0, 0.0, 25e-6, 0.0, 36e-6),
+            "",
+            "which no instrument reaches; expected columns",
+        ),
+        (SIGMA, (5e-3, 5e-3, 6e-3), "", "which no instrument reaches; expected columns in um or um"),
         (COVARIANCE, (1.0, 2.0, 0.0, 1.0, 0.0, 1.0), "", "line 2: the covariance of the point is not"),
         (SIGMA[:2], (5.0, 4.0), "", "sigma_Z_um"),
         ((*SIGMA, *COVARIANCE), (1, 1, 1, 1, 0, 0, 1, 0, 1), "", "expected one of both kinds"),
