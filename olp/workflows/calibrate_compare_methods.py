@@ -27,6 +27,7 @@ from olp.calibration.methods.judging import (
 )
 from olp.calibration.methods.pod_map import pod_map
 from olp.calibration.observations.base import Observation
+from olp.calibration.observations.copies import refuse_copies
 from olp.calibration.observations.lines import Line
 from olp.calibration.observations.measurements import Measurements
 from olp.calibration.observations.pods import Pods
@@ -163,6 +164,9 @@ def compare_methods(
     else:
         check, _ = load_checkpoints(points, sigma_um=sigma_um, tool_mm=tool_mm)
         inputs = (*inputs, *files_of_measurements([points]))
+    # points that a method was made from do not judge it
+    for copy in refuse_copies((*measurements.observations, check)):
+        raise copy
     shop = Shop(described, measurements, _box(measurements, check))
     rows = [Judged(UNCORRECTED, *judged(check, lambda axis, _: np.zeros(axis.shape)))]
     why_not: list[dict[str, str]] = []

@@ -193,6 +193,14 @@ def test_lines_and_pods_beat_equation_1_and_the_map() -> None:
     )
 
 
+def test_points_that_were_used_do_not_judge() -> None:
+    _, measurements = case(0, "smooth", "FXYZ")
+    check = cloud(SHOP, 9, 30, 0.5)
+    used = dataclasses.replace(measurements.also([check]), machine="simulated")
+    with pytest.raises(ConfigError, match="the same readings as"):
+        olp.compare_methods(used, check, shop())
+
+
 @pytest.mark.slow
 def test_another_chain_has_no_equation_1_and_nothing_is_nothing() -> None:
     machine, measurements = case(2, "smooth", "XYFZ")
