@@ -115,11 +115,11 @@ def test_steps_and_ripple_before_any_reading_go_with_the_size_of_a_machine(size:
     """Lines show the size of the smooth part and nothing else: 16 times as large, 4 times the ripple."""
     table = candidates("angle")
     smooth = (table[:, [0, 1, 4, 5, 6]] * rms_of_processes()[[0, 1, 4, 5, 6]]).sum(axis=1)
-    both = []
+    rows = []
     for one in (SIZES[size], 4.0 * SIZES[size], 16.0 * SIZES[size]):
         shown = np.where(np.isclose(smooth, one * USUAL["angle"]), 0.0, -1e3)
-        both.append(characters(dict.fromkeys(ANGLES, shown))["ECX"].values[2:4])
-    both = np.array(both)
+        rows.append(characters(dict.fromkeys(ANGLES, shown))["ECX"].values[2:4])
+    both = np.array(rows)
     assert np.all(np.diff(both, axis=0) > 0.0)
     assert both[2, 1] / both[0, 1] == pytest.approx(4.0, rel=0.35)
 

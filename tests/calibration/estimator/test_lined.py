@@ -82,7 +82,8 @@ def test_points_beside_lines_tell_rough_curves_from_smooth_ones() -> None:
         fitted = fit(taken, machine.chain, datum_mm=(0.0, 0.0, 0.0))
         alone = fit(dataclasses.replace(taken, observations=taken.lines), machine.chain)
         found[family] = hidden_and_steps(fitted) / hidden_and_steps(alone)
-        position, tool = np.random.default_rng(2).uniform(*machine.box.T, (200, 3)), np.array(FRESH[1])
+        low, high = machine.box.T
+        position, tool = np.random.default_rng(2).uniform(low, high, (200, 3)), np.array(FRESH[1])
         off, sigma = (
             fitted.error(position, tool) - machine.error(position, tool),
             fitted.sigma(position, tool),
