@@ -11,14 +11,18 @@ compared by the evidence of all readings (D. J. C. MacKay, Neural Computation 4,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from olp.calibration.diagnosis.mistakes import EXCLUDED, EXPLAINS, Agreement, Tried
+from olp.calibration.estimator.between import ripple_at_targets
 from olp.calibration.estimator.fitted import Fit
-from olp.calibration.estimator.normal import Normal
-from olp.calibration.observations.base import Alternative, State
+from olp.calibration.estimator.normal import Block, Chunk, Normal
+from olp.calibration.observations.base import Alternative, ScatteredState, State
+from olp.calibration.observations.lines import LineState, targets_of
+from olp.calibration.observations.radial import AlongState
 from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute
 from olp.core.values import dataclass
@@ -28,116 +32,14 @@ from olp.errormodel.quality import Fitted
 _LEAST_SHARE = 1e-3
 #: Directions of the unknowns of which a source says less than this, against the best, count for nothing.
 _NOTHING = 1e-13
-#: What may be wrong in one fit, at most: ten mistakes of each of twenty sources.
-_TRIED = 200
-#: Share of fits of sound readings in which one of them may be named.
-_BY_CHANCE = 0.01
-#: Nats by which something is named as wrong with a source. Sound readings give such odds for one mistake with
-#: at most the inverse of them as its chance, whatever the mistake.
-NAMED = math.log(_TRIED / _BY_CHANCE)
-#: Nats by which the others have to confirm what is named: 20 to 1.
-_CONFIRMED = math.log(20.0)
-#: Such a cause explains at least this share of what a source contradicts, by the evidence.
-_EXPLAINS = 0.9
-#: Nats by which others confirm one reading at most: what its curve may be over its noise is below e^10.
-_PER_READING = 10.0
-#: Nats by which something is excluded: 100 to 1.
-EXCLUDED = math.log(100.0)
+#: A mistake is sought in a source that differs from what others say by more than so many deviations.
+_DIFFERS = 1.0
+#: Sources of one kind fit no better than this, as a share of what noise has.
+_LEAST_MISFIT = 0.05
 #: Curves of two sizes for which evidence is taken differ by this factor at most.
 _APART = 10.0
 #: At most so many sources of a fit are put right, one after the other.
 _MOST = 4
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Tried:
-    """Something that may be wrong with a source, its kind and in words, and its log odds (nats) against what
-    was read. `support` are its log odds against a source that says nothing: whether the others confirm it.
-    What is `sought` may be named by itself; the rest is excluded or not. `change` (size,) is by how much the
-    unknowns are others if it is so."""
-
-    kind: str
-    words: str
-    log_odds: float
-    support: float
-    sought: bool = True
-    change: Array = field(default_factory=lambda: np.zeros(0))
-
-    @property
-    def confirmed(self) -> bool:
-        """Whether the others confirm it."""
-        return self.support > _CONFIRMED
-
-    @property
-    def beyond_doubt(self) -> bool:
-        """Whether what was read is beyond doubt not so, and this explains it."""
-        return self.confirmed and self.log_odds > NAMED
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Agreement:
-    """A source against all others: `misfit` is the sum of z^2 over as many directions as freedom, `tried` is
-    what may be wrong with it, the most probable first. `against` is the log odds (nats) that it says nothing
-    of this machine. `rivals` are the names of sources of which one is wrong as probably instead, `number` is
-    its place among all sources."""
-
-    label: str
-    component: str
-    misfit: Fitted
-    tried: tuple[Tried, ...]
-    against: float
-    rivals: tuple[str, ...] = ()
-    number: int = 0
-
-    @property
-    def name(self) -> str:
-        """Its file, and the component that it reads."""
-        other = self.component and self.component != self.label
-        return f"{self.label} ({self.component})" if other else self.label
-
-    @property
-    def named(self) -> Tried | None:
-        """What is wrong with it beyond doubt. Where something that is sought is, so is something else that
-        explains it better."""
-        found = [tried for tried in self.tried if tried.beyond_doubt]
-        return found[0] if any(tried.sought for tried in found) else None
-
-    @property
-    def causes(self) -> str:
-        """What is wrong with it in words, with all that is not excluded against what is most probable."""
-        best = self.named
-        if best is None:
-            return ""
-        return _in_words((one for one in self.tried if one.beyond_doubt), best.log_odds)
-
-    @property
-    def likely(self) -> str:
-        """In words what explains nearly all that it contradicts though the others do not confirm it, with all
-        that is not excluded against that."""
-        sought = [tried for tried in self.tried if tried.sought]
-        best = max((tried.log_odds for tried in sought), default=-np.inf)
-        return _in_words(sought, best) if best > max(NAMED, _EXPLAINS * self.against) else ""
-
-    @property
-    def contradicts(self) -> bool:
-        """Whether it is better to leave it out than to believe it, whatever is wrong with it."""
-        return self.misfit.failed and self.against > NAMED
-
-    @property
-    def doubt(self) -> float:
-        """The largest log odds (nats) that something is wrong with it; above `NAMED` it is told."""
-        odds = [tried.log_odds for tried in self.tried if tried.sought and tried.confirmed]
-        return max([*odds, self.against if self.misfit.failed else -np.inf])
-
-    @property
-    def open(self) -> tuple[Tried, ...]:
-        """What may be wrong with it without notice, as the readings do not exclude it."""
-        return tuple(tried for tried in self.tried if tried.log_odds > -EXCLUDED)
-
-
-def _in_words(tried: Iterable[Tried], best: float) -> str:
-    """In words what is not excluded against log odds of `best`."""
-    return ", or ".join(one.words for one in tried if one.log_odds > best - EXCLUDED)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -165,7 +67,7 @@ class _Source:
     @staticmethod
     def read(state: State, fit: Fit) -> _Source:
         normal = Normal.of(fit.parameters.size)
-        normal.add(fit.block(state))
+        normal.add(_block(state, fit))
         return _Source.of(state, normal)
 
 
@@ -230,6 +132,24 @@ class Compared:
     unlike: tuple[Agreement, ...]
 
 
+def _block(state: State, fit: Fit) -> Block:
+    """The readings of a state. Where others read beside targets, ripple at the targets of a line is its own
+    alone."""
+    block, shape = fit.block(state), fit.prior.shapes.get(state.component)
+    others = any(isinstance(result.state, ScatteredState | AlongState) for result in fit.results)
+    if not isinstance(state, LineState) or shape is None or not others:
+        return block
+    ripple = ripple_at_targets(fit.parameters.spaces[state.component].spline, shape.scales)
+    line = state.observation
+    target = np.abs(line.target_mm[:, None] - targets_of(line)).argmin(axis=1)
+
+    def chunks() -> Iterator[Chunk]:
+        for chunk in block.chunks():
+            yield replace(chunk, beside=np.full(len(chunk.y), ripple), group=target)
+
+    return replace(block, chunks=chunks)
+
+
 def compared(fit: Fit, states: Sequence[State] | None = None) -> Compared:
     """Compare each source of a fit, or each of these `states` of it, with all others."""
     states = [result.state for result in fit.results] if states is None else states
@@ -243,16 +163,16 @@ def compared(fit: Fit, states: Sequence[State] | None = None) -> Compared:
         if index < 0:
             break
         left.discard(index)
-        if found is None:
-            alike = [index, *(k for k in sorted(left) if _as_doubtful(now[k], now[index]))]
-            left.difference_update(alike)
-            for k in alike:
-                unlike.append(replace(now[k], rivals=tuple(now[j].name for j in alike if j != k)))
-            sources[index] = _Source.of(sources[index].state, Normal.of(fit.parameters.size))
-        else:
-            wrong.append(now[index])
-            sources[index] = _put_right(fit, sources[index], found.words)
+        before, worst = now, now[index]
+        sources[index] = _changed(fit, sources[index], found)
         now = _agreements(fit, sources)
+        if found is None:
+            either = [index, *(k for k in sorted(left) if _as_doubtful(before[k], worst))]
+        else:
+            either = [index, *(k for k in sorted(left) if _instead(before[k], worst, now[k]))]
+        left.difference_update(either)
+        told = wrong if found is not None else unlike
+        told += [replace(before[k], rivals=tuple(before[j].name for j in either if j != k)) for k in either]
     return Compared(first, tuple(wrong), tuple(unlike))
 
 
@@ -263,15 +183,18 @@ def _worst(now: tuple[Agreement, ...], left: set[int]) -> tuple[int, Tried | Non
     named = {k: found for k in left if (found := now[k].named) is not None}
     most = max(against)
 
-    def explained(k: int) -> float:
-        """How much the cause explains, as far as it can: what others tell of a sound source where they follow
-        a wrong one is no more than absurd."""
-        return min(named[k].log_odds, now[k].against + _PER_READING * now[k].misfit.freedom)
-
-    best = max(named, key=explained, default=-1)
-    if best >= 0 and named[best].log_odds > _EXPLAINS * most:
+    best = max(named, key=lambda k: now[k].explained, default=-1)
+    if best >= 0 and named[best].log_odds > EXPLAINS * most:
         return best, named[best]
     return (int(np.argmax(against)), None) if np.isfinite(most) else (-1, None)
+
+
+def _instead(one: Agreement, named: Agreement, right: Agreement) -> bool:
+    """Whether a source may be the wrong one as well as one that is named: nothing is wrong with it any more
+    when that is put `right`, and a mistake of it explains the readings nearly as well."""
+    if one.named is None or named.named is None or right.named is not None or right.contradicts:
+        return False
+    return one.explained > named.explained - EXCLUDED
 
 
 def _as_doubtful(one: Agreement, worst: Agreement) -> bool:
@@ -280,9 +203,12 @@ def _as_doubtful(one: Agreement, worst: Agreement) -> bool:
     return one.contradicts and one.against > worst.against - EXCLUDED
 
 
-def _put_right(fit: Fit, source: _Source, words: str) -> _Source:
+def _changed(fit: Fit, source: _Source, found: Tried | None) -> _Source:
+    """A source put right by what is wrong with it, or left out where that is not known."""
+    if found is None:
+        return _Source.of(source.state, Normal.of(fit.parameters.size))
     alternatives = source.state.observation.alternatives()
-    return _as(fit, next(one for one in alternatives if one.words == words))
+    return _as(fit, next(one for one in alternatives if one.words == found.words))
 
 
 def _as(fit: Fit, alternative: Alternative) -> _Source:
@@ -320,10 +246,24 @@ def _agreements(fit: Fit, sources: list[_Source]) -> tuple[Agreement, ...]:
         z = views[0].others.z(source)
         misfit = Fitted(label, float(z @ z), float(len(z)))
         as_read = _heard(views, source, _ALIKE, np.zeros(0, np.int64))
-        tried = [_tried(fit, views, one, as_read, _curve(fit, source), off=misfit.failed) for one in tries]
+        tried = [_tried(fit, views, one, as_read, _curve(fit, source), misfit) for one in tries]
         tried = sorted([*tried, _of_another(fit, views[-1], as_read)], key=lambda one: -one.log_odds)
         found.append(Agreement(label, component, misfit, tuple(tried), -as_read.support, (), number))
-    return tuple(found)
+    return _beside_their_kind(found, sources)
+
+
+def _beside_their_kind(found: Sequence[Agreement], sources: Sequence[_Source]) -> tuple[Agreement, ...]:
+    """The same, where readings all over the volume of one kind fit better than noise and ripple have it, with
+    the misfit of each in units of theirs."""
+    kinds = [type(source.state) if isinstance(source.state, ScatteredState) else None for source in sources]
+    beside = []
+    for k, one in enumerate(found):
+        like = [other.misfit for j, other in enumerate(found) if j != k and kinds[j] is kinds[k] is not None]
+        freedom = sum(misfit.freedom for misfit in like)
+        usual = sum(misfit.chi_square for misfit in like) / max(freedom, 1.0)
+        scaled = Fitted(one.label, one.misfit.chi_square / max(usual, _LEAST_MISFIT), one.misfit.freedom)
+        beside.append(replace(one, beside=scaled) if freedom and usual < 1.0 else one)
+    return tuple(beside)
 
 
 def _alternatives(fit: Fit, source: _Source) -> Iterator[tuple[Alternative, _Source]]:
@@ -394,17 +334,18 @@ def _tried(
     alternative: tuple[Alternative, _Source],
     as_read: _Heard,
     curve: Index,
-    *,
-    off: bool,
+    misfit: Fitted,
 ) -> Tried:
-    """What may be wrong with a source, `off` or not: how much better the others predict it then. What the
-    prior makes of its size is taken off. `curve` are the unknowns of the curve that it reads."""
+    """What may be wrong with a source: how much better the others predict it then. What the prior makes of
+    its size is taken off. `curve` are the unknowns of the curve that it reads. Where it differs from the
+    others as chance has it, another one that they predict too is none that is sought."""
     one, other = alternative
     heard = _heard(views, other, _sizes(one.factor) if len(curve) else _ALIKE, curve)
     change = np.zeros(fit.parameters.size)
     change[views[0].others.columns] = heard.mean - as_read.mean
     log_odds = heard.support - as_read.support
-    return Tried(one.kind, one.words, log_odds, heard.support, off or not one.where_off, change)
+    sought = misfit.failed if one.where_off else misfit.deviations > _DIFFERS
+    return Tried(one.kind, one.words, log_odds, heard.support, sought, change)
 
 
 def _of_another(fit: Fit, view: _Views, as_read: _Heard) -> Tried:

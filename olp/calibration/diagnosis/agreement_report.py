@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from olp.calibration.diagnosis.agreement import Agreement, Compared, Tried
+from olp.calibration.diagnosis.agreement import Compared
+from olp.calibration.diagnosis.mistakes import Agreement, Tried
 from olp.calibration.estimator.character import class_of, largest
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.summary import grid_of
@@ -34,15 +35,14 @@ def agreement_findings(found: Compared, fit: Fit, tools: Sequence[Vector]) -> It
         yield Finding(
             "OLP810",
             f"{one.name}: {one.causes}; so it agrees with all other readings, with odds of "
-            f"10^{one.named.log_odds / math.log(10.0):.0f} to 1",
+            f"10^{one.named.log_odds / math.log(10.0):.0f} to 1" + _instead(one),
         )
     for one in found.unlike:
         yield Finding(
             "OLP811",
-            f"{one.name}: it differs from what all other readings say by "
-            f"{math.sqrt(one.misfit.reduced):.1f} times what both uncertainties explain"
+            f"{one.name}: it differs from what all other readings say by {_times(one)}"
             + (f"; it may be that {one.likely}, which they do not confirm" if one.likely else "")
-            + (f"; or {' or '.join(one.rivals)} is wrong instead, as probably" if one.rivals else ""),
+            + _instead(one),
         )
     told = {one.number for one in (*found.wrong, *found.unlike)}
     harms = [
@@ -53,6 +53,18 @@ def agreement_findings(found: Compared, fit: Fit, tools: Sequence[Vector]) -> It
         words = ", ".join(f"{name} {harm:.3g} um ({kind})" for harm, name, kind in costs[:_LISTED])
         more = f" and {len(costs) - _LISTED} more" if len(costs) > _LISTED else ""
         yield Finding("OLP812", f"{len(costs)} of {len(found.sources)} sources: {words}{more}")
+
+
+def _times(one: Agreement) -> str:
+    """In words by how much a source differs."""
+    if one.beside is not None and one.unlike_its_kind:
+        return f"{math.sqrt(one.beside.reduced):.1f} times as much as others of its kind do"
+    return f"{math.sqrt(one.misfit.reduced):.1f} times what both uncertainties explain"
+
+
+def _instead(one: Agreement) -> str:
+    """In words which sources may be wrong instead."""
+    return f"; or {' or '.join(one.rivals)} is wrong instead, as probably" if one.rivals else ""
 
 
 def agreement_rows(found: Compared, fit: Fit, tools: Sequence[Vector]) -> list[dict[str, Any]]:

@@ -68,6 +68,13 @@ def beside_cells(spline: Spline, scales: Scales) -> Hidden:
     return Hidden(np.array([spline.low_mm]), np.array([_lost(spline.cells) @ scales.values**2]))
 
 
+def ripple_at_targets(spline: Spline, scales: Scales) -> float:
+    """The standard deviation of ripple at a target that is another one right beside it. Cells take it for
+    their own, as lines alone do not tell it."""
+    values = spline.values(np.linspace(spline.low_mm, spline.high_mm, _FINE[0]))
+    return math.sqrt(SHORT * float((values**2).sum(axis=1).mean())) * scales.ripple
+
+
 def in_cells(scales: Scales) -> Scales:
     """The scales of such a curve less what is shorter than any cell."""
     return replace(scales, ripple=math.sqrt(1.0 - SHORT) * scales.ripple)

@@ -12,8 +12,9 @@ from cases.fast import some_of_a_campaign
 from judge import simulated
 from judge.simulated import OFFSETS
 
-from olp.calibration.diagnosis.agreement import Agreement, Compared, Tried, _given, compared
+from olp.calibration.diagnosis.agreement import Compared, _given, compared
 from olp.calibration.diagnosis.agreement_report import agreement_findings, agreement_rows
+from olp.calibration.diagnosis.mistakes import Agreement, Tried
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.observations.artefact import Artefact
 from olp.calibration.observations.lines import Line

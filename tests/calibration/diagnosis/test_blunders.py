@@ -6,14 +6,28 @@ import dataclasses
 
 import numpy as np
 import pytest
-from cases.blunders import ALARMS, LOUD, Blunder, blunders, clean_fit, outcome, readings, size
+from cases import volumetric
+from cases.blunders import (
+    ALARMS,
+    LOUD,
+    MIXTURES,
+    OTHER,
+    Blunder,
+    blunders,
+    clean_fit,
+    outcome,
+    readings,
+    size,
+)
 from cases.fast import left_to_a_campaign, some_of_a_campaign
+from judge import families
 
 from olp.calibration.diagnosis.agreement import compared
 from olp.calibration.diagnosis.agreement_report import agreement_rows
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.observations.circles import Circles
 from olp.calibration.observations.diagonals import Diagonal
+from olp.workflows.calibrate_fit import fit_calibration
 
 #: Kind of blunder, file, and what the lines are taken with.
 PLANTED = (
@@ -137,3 +151,59 @@ def test_what_may_be_wrong_with_diagonals_and_circles_is_undone_by_itself() -> N
             name = kinds[alternative.kind]
             assert np.array_equal(getattr(again.observation, name), getattr(one, name))
             assert not np.array_equal(getattr(alternative.observation, name), getattr(one, name))
+
+
+@pytest.mark.slow
+def test_of_two_lines_that_explain_it_alike_both_are_named() -> None:
+    """Lines against the two legs of one square: which of them ran the other way, nothing else tells."""
+    whole = readings(3013, "dents", "pods")
+    assert whole.chain is not None
+    taken = [*whole.observations]
+    one = next(
+        one
+        for one in blunders(3013, "dents", "pods")
+        if (one.kind, one.planted.source) == ("direction", "ezx.csv")
+    )
+    taken[one.index] = one.planted
+    found = compared(fit(dataclasses.replace(whole, observations=tuple(taken)), whole.chain))
+    assert {wrong.label: wrong.rivals for wrong in found.wrong} == {
+        "ezx.csv": ("exz.csv (EXZ)",),
+        "exz.csv": ("ezx.csv (EZX)",),
+    }
+
+
+@pytest.mark.slow
+def test_a_station_of_another_machine_is_not_taken_for_ripple() -> None:
+    whole = readings(3048, "dents", "stations")
+    assert whole.chain is not None
+    taken = [
+        other if one.source == "station-1.csv" else one
+        for one, other in zip(
+            whole.observations, readings(3048 + OTHER, "dents", "stations").observations, strict=True
+        )
+    ]
+    found = compared(fit(dataclasses.replace(whole, observations=tuple(taken)), whole.chain))
+    assert [one.label for one in found.unlike] == ["station-1.csv"]
+    assert found.unlike[0].unlike_its_kind
+
+
+#: Sound readings that once raised alarms: seed, family, and what reads the machine.
+ONCE_ALARMED = (
+    # a gear's wave at the targets of EYY, which points beside them do not see
+    (20207, "screws", "lines5+points"),
+    # a ball-bar in the middle of Z, and an EZZ that it would see as well if it were tiny
+    (20148, "rails", "lines5+ballbars"),
+    # kinks between targets, and stations that read far better than curves are known there
+    (20044, "joints", "stations"),
+    (20296, "joints", "artefacts"),
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "family", "mixture"), some_of_a_campaign(ONCE_ALARMED, 2))
+def test_sound_readings_raise_no_alarm(seed: int, family: str, mixture: str) -> None:
+    if mixture in MIXTURES:
+        taken = readings(seed, family, mixture)
+    else:
+        taken = volumetric.readings(families.machine(seed, family), mixture, seed)
+    assert not {finding.code for finding in fit_calibration(taken).findings} & set(ALARMS)
