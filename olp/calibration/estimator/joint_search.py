@@ -31,8 +31,8 @@ PLACES = 60
 FINE = 48
 #: A joint is at least so wide, mm.
 NARROW = 0.1
-#: What one more joint must gain beyond the choice of its place, nats.
-GAIN = 2.0
+#: What one more joint must gain beyond the choice of its place, nats: a dent gains up to some, as two joints.
+GAIN = 6.0
 #: Joints of all axes at most.
 MOST = 20
 #: Before any reading, half of the errors of an axis have a step at its joint: what a step costs, nats.
