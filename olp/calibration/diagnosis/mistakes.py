@@ -96,7 +96,7 @@ class Agreement:
         best = self.named
         if best is None:
             return ""
-        return _in_words((one for one in self.tried if one.beyond_doubt), best.log_odds)
+        return _in_words((one for one in self.tried if one.sought or one.beyond_doubt), best.log_odds)
 
     @property
     def likely(self) -> str:

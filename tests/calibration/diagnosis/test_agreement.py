@@ -298,6 +298,9 @@ def test_what_explains_a_wrong_source_best_is_named_even_if_it_is_not_sought() -
     assert one.causes == place.words
     near = dataclasses.replace(place, log_odds=13.0)
     assert dataclasses.replace(one, tried=(half, near)).causes == f"{half.words}, or {place.words}"
+    # alone it would not be named: its odds are too small, and the others hardly confirm it
+    sign = Tried("sign", "the sign of its values is reversed", 13.0, 1.4)
+    assert dataclasses.replace(one, tried=(half, sign)).causes == f"{half.words}, or {sign.words}"
     unconfirmed = dataclasses.replace(place, support=0.0)
     assert dataclasses.replace(one, tried=(unconfirmed, half)).named is half
 
