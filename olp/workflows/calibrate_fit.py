@@ -19,6 +19,7 @@ from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.nonrigid import NonRigid, nonrigid
 from olp.calibration.estimator.residual_map import map_findings, map_summary, residual_map
 from olp.calibration.estimator.summary import summary
+from olp.calibration.observations.alternating import alternating_findings
 from olp.calibration.observations.base import ScatteredState, State
 from olp.calibration.observations.copies import repeated_findings
 from olp.calibration.observations.measurements import MapWish, Measurements
@@ -136,6 +137,7 @@ def fit_calibration(
         *findings_of(fitted, tool_vectors, travel), *targets_apart(fitted),
         *agreement_findings(found, fitted, tool_vectors),
         *repeated_findings(measurements.observations),
+        *alternating_findings(measurements.observations),
         *([Finding("OLP862", f"not read: {', '.join(left)}")] if left else []),
     )  # fmt: skip
     _refuse_absurd(fitted, findings)

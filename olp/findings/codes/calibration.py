@@ -146,6 +146,17 @@ RULES = (
         "Run 3 of a laser was saved again as run 4.",
     ),
     _rule(
+        "OLP815",
+        "runs alternate, but have one direction",
+        Severity.WARNING,
+        "Every other run of a line reads more than its neighbours, as runs on the way back do, and by more "
+        "than chance explains. All are stated as one direction, so the fit finds no backlash. Some exports "
+        "list the targets of backward runs in the order of the forward ones.",
+        "State the direction of each run: in a CSV file, +1 or -1 in the column `direction`; in an .rtl "
+        "file, the targets of a backward run in falling order.",
+        "Runs 2, 4 and 6 of a laser read 5.5 um more than runs 1, 3 and 5.",
+    ),
+    _rule(
         "OLP841",
         "errors beyond the rigid-body model",
         Severity.INFO,
