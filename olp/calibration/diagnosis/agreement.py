@@ -134,10 +134,11 @@ class Compared:
 
 def _block(state: State, fit: Fit) -> Block:
     """The readings of a state. Where others read beside targets, ripple at the targets of a line is its own
-    alone."""
+    alone. Several lines of a component share it, and are compared with each other without."""
     block, shape = fit.block(state), fit.prior.shapes.get(state.component)
     others = any(isinstance(result.state, ScatteredState | AlongState) for result in fit.results)
-    if not isinstance(state, LineState) or shape is None or not others:
+    alone = sum(result.state.component == state.component for result in fit.results) == 1
+    if not isinstance(state, LineState) or shape is None or not (others and alone):
         return block
     ripple = ripple_at_targets(fit.parameters.spaces[state.component].spline, shape.scales)
     line = state.observation
