@@ -174,6 +174,9 @@ def _iterate(start: _Start, unread: Unread, learning: int, tell: Progress) -> _S
         slips = [state.slips(block, theta, settled) for state, block in zip(states, blocks, strict=True)]
         if seen == waves and settled and not any(slips):
             break
+        if any(slips) and unread.joints:
+            # a reading that slipped is told best by a joint on either side of it: without it, look again
+            unread.joints, learning = {}, turn + 2
         waves = seen
         outliers += [slip for some in slips for slip in some]
         states = [state.moved(step, some) for state, step, some in zip(states, steps, slips, strict=True)]

@@ -33,6 +33,8 @@ FINE = 48
 NARROW = 0.1
 #: What one more joint must gain beyond the choice of its place, nats: a dent gains up to some, as two joints.
 GAIN = 6.0
+#: Pieces of a rail are at least so long, against the axis: two joints side by side are one bad reading.
+SHORTEST = 0.05
 #: Joints of all axes at most.
 MOST = 20
 #: Before any reading, half of the errors of an axis have a step at its joint: what a step costs, nats.
@@ -50,7 +52,7 @@ def found(readings: Readings, known: Joints) -> Joints:
     joints, search = dict(known), _Search.of(readings)
     cost = GAIN + math.log(PLACES * max(len(axes), 1))
     for _ in range(MOST if axes else 0):
-        tried = [search.best(names, spaces[names[0]].spline) for names in axes]
+        tried = [search.best(names, spaces[names[0]].spline, joints) for names in axes]
         k = max(range(len(axes)), key=lambda k: tried[k][0])
         gain, low, high = tried[k]
         if gain < cost:
@@ -85,10 +87,14 @@ class _Search:
         base, y = table[:, :-1], table[:, -1]
         return cls(readings, chunk, base, y, precision, pull, *_explained(base, y, precision, pull))
 
-    def best(self, names: Sequence[str], spline: Spline) -> tuple[float, float, float]:
-        """The log evidence that the best of coarse places for a joint gains, and its sides in mm."""
+    def best(self, names: Sequence[str], spline: Spline, known: Joints) -> tuple[float, float, float]:
+        """The log evidence that the best of coarse places for a joint gains, away from those that are known,
+        and its sides in mm."""
         edges = np.linspace(spline.low_mm, spline.high_mm, PLACES + 1)
         gains = _steps(*self._seen(names, edges[:-1], edges[1:])[1:])[0]
+        far = SHORTEST * (spline.high_mm - spline.low_mm)
+        for step in {joint.step for name in names for joint in known.get(name, ())}:
+            gains[(edges[1:] > step.low_mm - far) & (edges[:-1] < step.high_mm + far)] = -np.inf
         k = int(np.argmax(gains))
         return float(gains[k]), float(edges[k]), float(edges[k + 1])
 
