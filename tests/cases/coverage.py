@@ -9,11 +9,13 @@ from functools import cache
 import numpy as np
 from cases import volumetric
 from cases.best_linear import Best
+from cases.blunders import ALARMS
 from cases.calibration import FRESH, measurements_of
 from judge import families, simulated
 
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.curves import sigma_of
+from olp.workflows.calibrate_fit import fit_calibration
 
 #: Positions of a curve where it is judged.
 POSITIONS = 40
@@ -33,6 +35,11 @@ class Scores:
     @property
     def rms(self) -> float:
         return float(np.sqrt(np.mean(self.error**2)))
+
+    @property
+    def square(self) -> float:
+        """Mean square of errors in stated sigma: 1 where these are true, however errors go together."""
+        return float(np.mean((self.error / self.sigma) ** 2))
 
     @property
     def stated(self) -> float:
@@ -74,15 +81,30 @@ def best_of(family: str, name: str, count: int) -> float:
     return float(np.sqrt(np.mean(sigma**2)))
 
 
-def volume_of(family: str, mixture: str, seed: int, *, against_best: bool = True) -> tuple[Scores, Scores]:
-    """A machine measured by a mixture (`volumetric.MIXTURES`), judged at poses. Errors and stated sigma in mm
-    are of the fit, then of the best linear estimator from the same readings (`against_best`)."""
+@dataclasses.dataclass(frozen=True)
+class Judged:
+    """A machine judged at poses: errors and stated sigma in mm of the fit, then of the best linear estimator
+    from the same readings; and what speaks against these, though nothing is wrong with them."""
+
+    own: Scores
+    best: Scores
+    alarms: tuple[str, ...]
+
+    def in_units(self, size: float) -> Judged:
+        """The same in units of a size in mm."""
+        parts = (Scores(one.error / size, one.sigma / size) for one in (self.own, self.best))
+        return Judged(*parts, self.alarms)
+
+
+def volume_of(family: str, mixture: str, seed: int) -> Judged:
+    """A machine measured by a mixture (`volumetric.MIXTURES`)."""
     machine = families.machine(seed, family)
-    datum = (0.0, 0.0, 0.0)
-    fitted = fit(volumetric.readings(machine, mixture, seed), machine.chain, datum_mm=datum)
+    calibrated = fit_calibration(volumetric.readings(machine, mixture, seed))
+    fitted = calibrated.fit
     rng = np.random.default_rng(seed)
     position, tool = rng.uniform(*machine.box.T, (POSITIONS * 3, 3)), np.array(FRESH[1])
     true = machine.error(position, tool)
     own = fitted.error(position, tool), fitted.sigma(position, tool)
-    best = Best(fitted, family).at(position, tool) if against_best else own
-    return Scores((own[0] - true).ravel(), own[1].ravel()), Scores((best[0] - true).ravel(), best[1].ravel())
+    best = Best(fitted, family).at(position, tool)
+    alarms = tuple(sorted({one.code for one in calibrated.findings} & set(ALARMS)))
+    return Judged(*(Scores((error - true).ravel(), sigma.ravel()) for error, sigma in (own, best)), alarms)

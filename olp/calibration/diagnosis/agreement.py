@@ -191,8 +191,8 @@ def _worst(now: tuple[Agreement, ...], left: set[int]) -> tuple[int, Tried | Non
 
 
 def _instead(one: Agreement, named: Agreement, right: Agreement) -> bool:
-    """Whether a source may be the wrong one as well as one that is named: nothing is wrong with it any more
-    when that is put `right`, and a mistake of it explains the readings nearly as well."""
+    """Whether a source may be the wrong one as well as one that is named. Then nothing is wrong with it any
+    more when that is put `right`, and a mistake of it explains the readings nearly as well."""
     if one.named is None or named.named is None or right.named is not None or right.contradicts:
         return False
     return one.explained > named.explained - EXCLUDED

@@ -22,8 +22,7 @@ _LARGE = 3.0
 def alternating_findings(observations: Sequence[Observation]) -> Iterator[Finding]:
     """A finding for each line of one direction whose runs are as those of two."""
     for taken in observations:
-        off = _alternation(taken) if isinstance(taken, Line) else None
-        if off is not None:
+        if isinstance(taken, Line) and (off := _alternation(taken)) is not None:
             unit, scale = unit_of(taken.component)
             side = "forward" if taken.direction[0] > 0 else "backward"
             yield Finding(
@@ -34,8 +33,8 @@ def alternating_findings(observations: Sequence[Observation]) -> Iterator[Findin
 
 
 def _alternation(line: Line) -> float | None:
-    """By how much the second, fourth ... run reads more than the others, mm or rad, beside a steady drift;
-    None where they do not alternate, or have not all the same targets in one direction."""
+    """By how much the second, fourth and so on read more than the other runs, mm or rad, beside a steady
+    drift. None where runs do not alternate, or have not all the same targets in one direction."""
     from scipy.stats import t
 
     runs = list(dict.fromkeys(line.run.tolist()))

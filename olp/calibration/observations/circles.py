@@ -115,7 +115,7 @@ class CirclesState(AlongState):
         return int(circle_used(self.observation).sum())
 
     def positions(self) -> Array:
-        return circle_positions(self.observation)[circle_used(self.observation)]
+        return np.asarray(circle_positions(self.observation)[circle_used(self.observation)])
 
     def block(self, parameters: Unknowns, theta: Array) -> Block:
         return circle_block(self.observation, parameters)
