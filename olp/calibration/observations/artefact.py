@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -49,6 +49,8 @@ class Artefact(Scattered):
     with `covariance_mm2` (n, 3, 3) of each centre their root mean square. `sigma_ball_mm` (balls,) is that of
     the certificate; 0 where the place is only as drawn. Raises ConfigError.
     """
+
+    read_columns: ClassVar[tuple[str, ...]] = ("ball", "pose", "axis_mm")
 
     axis_mm: Array
     tool_mm: Array

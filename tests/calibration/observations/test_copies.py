@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases import volumetric
 from cases.calibration import cloud, line_of
 from judge import simulated
 
@@ -65,6 +66,14 @@ def test_a_copied_run_and_copied_points_are_told() -> None:
     assert [finding.code for finding in told] == ["OLP814", "OLP814"]
     assert "run 2 (+1) repeats run 1" in told[0].message and "6 of 36 rows" in told[1].message
     assert not list(repeated_findings([LINE, POINTS]))
+
+
+@pytest.mark.parametrize("mixture", [name for name, (_, more) in volumetric.MIXTURES.items() if more])
+def test_readings_of_every_instrument_are_no_copies_and_copies_of_them_are(mixture: str) -> None:
+    """Readings of plates had no columns to compare, which ended with a traceback."""
+    taken = volumetric.readings(MACHINE, mixture, 3).observations
+    assert not list(refuse_copies(taken)) and not list(repeated_findings(taken))
+    assert len(list(refuse_copies([*taken, taken[-1]]))) == 1
 
 
 @pytest.mark.parametrize(
