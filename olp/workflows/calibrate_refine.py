@@ -38,6 +38,8 @@ from olp.workflows.shown import Filed
 
 #: A run with a reduced chi-square above this does not agree with the covariance.
 MISFIT = 1.5
+#: A run agrees too well where chance gives so small a chi-square with less than this probability.
+UNLIKELY = 1e-6
 #: Most points of a path; more are thinned evenly, as they add no information.
 MOST_POINTS = 3000
 #: Most rows of points that a finding names.
@@ -242,7 +244,11 @@ def _report(calibration: Calibration, done: Refinement, points: int) -> dict[str
 
 
 def _findings(done: Refinement) -> Iterator[Finding]:
+    from scipy.stats import chi2
+
     ratio = done.chi_square / done.freedom
+    if chi2.cdf(done.chi_square, done.freedom) < UNLIKELY:
+        yield Finding("OLP840", f"reduced chi-square is {ratio:.2g} with {done.freedom:.0f} readings")
     if ratio > MISFIT:
         yield Finding(
             "OLP839",

@@ -26,7 +26,7 @@ from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.writer import calibration_files
 from olp.files.config import load_setup
 from olp.files.measurements.checkpoints import load_checkpoints
-from olp.workflows.calibrate_refine import refine_calibration
+from olp.workflows.calibrate_refine import _findings, refine_calibration
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
 
@@ -113,6 +113,17 @@ def test_a_slip_is_left_out(begun) -> None:
     assert [row for row, _ in done.outliers] == [18]
     clean = refine(calibration, machine.chain, uncertainty, points)
     assert done.after_mm == pytest.approx(clean.after_mm, rel=0.1)
+
+
+def test_one_run_twice_is_told(begun) -> None:
+    """It counts as two, and passed in silence."""
+    machine, calibration, uncertainty = begun
+    points = run(machine, 7, 40, 0.005)
+    once = refine(calibration, machine.chain, uncertainty, points)
+    twice = refine(once.calibration, machine.chain, once.uncertainty, points)
+    other = refine(once.calibration, machine.chain, once.uncertainty, run(machine, 8, 40, 0.005))
+    told = [[finding.code for finding in _findings(done)] for done in (once, twice, other)]
+    assert "OLP840" in told[1] and "OLP840" not in told[0] + told[2]
 
 
 def test_points_say_nothing_along_their_path(begun) -> None:

@@ -97,4 +97,15 @@ RULES = (
         "again where it is small.",
         "15 um measured, 6 um expected.",
     ),
+    _rule(
+        "OLP840",
+        "a run that agrees too well",
+        Severity.WARNING,
+        "The points differ from the calibration by much less than their own noise would make them differ. "
+        "So this run has refined the calibration before, or the stated uncertainty of the points is too "
+        "large.",
+        "Do not refine with one run twice: it counts as two, and the stated uncertainty is too small. Else "
+        "state what the points scatter by.",
+        "Reduced chi-square is 0.09 with 57 readings.",
+    ),
 )
