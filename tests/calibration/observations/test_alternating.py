@@ -43,3 +43,11 @@ def test_stated_directions_and_runs_without_backlash_are_not() -> None:
         line = one_way(a_line("EYX", seed, 4))
         drift = 5e-3 * np.argsort(np.argsort(line.run)) / len(line.run)
         assert not list(alternating_findings([line, replace(line, value=line.value + drift)]))
+
+
+def test_an_alternation_as_small_as_noise_is_not_told() -> None:
+    line = one_way(a_line("EYX", 1, 5))
+    back = a_line("EYX", 1, 5).direction < 0
+    value = np.random.default_rng(2).normal(0.0, 1e-3, len(back))
+    assert not list(alternating_findings([replace(line, value=value + 1.5e-3 * back)]))
+    assert list(alternating_findings([replace(line, value=value + 6e-3 * back)]))
