@@ -158,10 +158,12 @@ def _iterate(start: _Start, unread: Unread, learning: int, tell: Progress) -> _S
         theta = _sized(theta, prior)
         if turn < learning:
             # before the first pass the places of instruments are only near
-            if unread.heard and _found(unread, prior, states, theta):
+            readings = Readings.of(prior, states, theta)
+            if readings is not None and unread.heard and _found(unread, readings):
                 prior = _prior(start, unread, waves)
                 theta = _sized(theta, prior)
-            if unread.learn(prior, states, theta):
+                readings = Readings.of(prior, states, theta)
+            if readings is not None and unread.learn(readings):
                 prior = _prior(start, unread, waves)
         parameters = prior.parameters
         blocks = [block_of(state, theta, parameters, prior.hidden) for state in states]
@@ -195,12 +197,10 @@ def _sized(theta: Array, prior: Prior) -> Array:
     return theta if len(theta) == prior.parameters.size else np.zeros(prior.parameters.size)
 
 
-def _found(unread: Unread, prior: Prior, states: Sequence[State], theta: Array) -> bool:
+def _found(unread: Unread, readings: Readings) -> bool:
     """Adds the joints of rails that readings show beside those that are known; whether there are any."""
-    readings = Readings.of(prior, states, theta)
     before = unread.joints
-    if readings is not None:
-        unread.joints = found(readings, before)
+    unread.joints = found(readings, before)
     return unread.joints != before
 
 

@@ -104,12 +104,9 @@ class Unread:
     def classes(self) -> dict[str, Class]:
         return _classes(self.own)
 
-    def learn(self, prior: Prior, states: Sequence[State], theta: Array) -> bool:
-        """Adds what readings beside lines say of the classes; False where there are no such readings."""
-        readings = Readings.of(prior, states, theta)
-        if readings is None:
-            return False
-        normal = readings.normal(self.own, self.lined.shapes())
+    def learn(self, readings: Readings) -> bool:
+        """Adds what readings beside lines say of the classes; False where they say nothing more."""
+        normal, prior = readings.normal(self.own, self.lined.shapes()), readings.prior
         p = prior.parameters
         kinds = [
             kind for kind in self.own

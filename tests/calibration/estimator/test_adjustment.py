@@ -253,6 +253,7 @@ def test_a_length_that_slipped_is_left_out_and_named() -> None:
     bad = (*all_rays[:2], dataclasses.replace(all_rays[2], length_mm=wrong), *all_rays[3:])
     fitted = fit(Measurements("m", bad), "FXYZ")
     assert [(outlier.source, outlier.row) for outlier in fitted.outliers] == [("station-2.csv", 34)]
+    assert not fitted.prior.joints, "what it seemed to show of rails is forgotten"
     assert not findings_with(fitted, "OLP808")
 
 
